@@ -1,0 +1,341 @@
+//! One file that holds a network and everything needed to use it rightly.
+//!
+//! A safetensors file. Tensors, all float32: `layers.N.weight` (4, outputs, inputs),
+//! `layers.N.bias` (4, outputs), `input.mean`, `input.std`, `output.mean`, `output.std`. Its
+//! metadata has one entry, `ambulo`: the [`Header`] as JSON. One entry, because the order of
+//! several is not fixed and the same bundle must always be the same bytes.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use safetensors::tensor::{Dtype, TensorView};
+use safetensors::{SafeTensorError, SafeTensors};
+use serde::{Deserialize, Serialize};
+
+use crate::{CONTROL_POINTS, Layer, Network, NetworkError, Normalisation};
+
+/// The version this code writes, and the highest it reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+const METADATA_KEY: &str = "ambulo";
+const NORMALISATION: [&str; 4] = ["input.mean", "input.std", "output.mean", "output.std"];
+
+/// What the two vectors are made of: blocks by name and size, in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LayoutTable {
+    /// Name of the family of layouts, `holden` for instance.
+    pub name: String,
+    /// Fingerprint of the tables and of the meaning of their numbers.
+    pub hash: String,
+    /// Blocks of the input vector.
+    pub inputs: Vec<(String, usize)>,
+    /// Blocks of the output vector.
+    pub outputs: Vec<(String, usize)>,
+}
+
+/// Everything in a bundle but its numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Version of the file format.
+    pub format: u32,
+    /// Architecture: `pfnn`.
+    pub kind: String,
+    /// Activation of the hidden layers: `elu`.
+    pub activation: String,
+    /// Steps a second that the network was trained for.
+    pub fps: f64,
+    /// Layout of the vectors.
+    pub layout: LayoutTable,
+    /// Licence of the data behind the weights, in words; it stays with the model.
+    pub licence: String,
+    /// Where the model comes from: source, tool, settings; free text by key.
+    pub provenance: BTreeMap<String, String>,
+    /// What other parts of a runtime store beside the network, by part (`skeleton`).
+    pub parts: BTreeMap<String, serde_json::Value>,
+}
+
+/// Why bytes are not a bundle.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum BundleError {
+    #[error("not a safetensors file: {0}")]
+    Container(#[from] SafeTensorError),
+    #[error("a safetensors file, but not an Ambulo bundle: its metadata has no '{METADATA_KEY}'")]
+    NotABundle,
+    #[error("the bundle's header is broken: {0}")]
+    Header(serde_json::Error),
+    #[error(
+        "the bundle is of format {found}, this version reads up to {FORMAT_VERSION}: update Ambulo"
+    )]
+    Version { found: u32 },
+    #[error("{what} '{found}' is not known; expected '{expected}'")]
+    Unknown { what: &'static str, found: String, expected: &'static str },
+    #[error("fps must be positive and finite, not {0}")]
+    Fps(f64),
+    #[error("tensor '{0}' is missing")]
+    Missing(String),
+    #[error("tensor '{0}' is not part of this format")]
+    Extra(String),
+    #[error("tensor '{tensor}': expected {expected}, got {found}")]
+    Tensor { tensor: String, expected: &'static str, found: String },
+    #[error("the layout's {side} blocks sum to {blocks}, the network has {network} {side}")]
+    Layout { side: &'static str, blocks: usize, network: usize },
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+}
+
+/// A network and its header.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bundle {
+    header: Header,
+    network: Network,
+}
+
+impl Bundle {
+    /// Checks that header and network belong together.
+    ///
+    /// # Errors
+    /// An unknown version, kind or activation, a frame rate that is not positive, blocks that do
+    /// not sum to the network's widths.
+    pub fn new(header: Header, network: Network) -> Result<Self, BundleError> {
+        check_header(&header)?;
+        let sides = [
+            ("inputs", &header.layout.inputs, network.inputs()),
+            ("outputs", &header.layout.outputs, network.outputs()),
+        ];
+        for (side, blocks, network) in sides {
+            let blocks = blocks.iter().fold(0usize, |sum, (_, size)| sum.saturating_add(*size));
+            if blocks != network {
+                return Err(BundleError::Layout { side, blocks, network });
+            }
+        }
+        Ok(Self { header, network })
+    }
+
+    /// Everything but the numbers.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The network.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// Reads a bundle; the bytes may come from anywhere.
+    ///
+    /// # Errors
+    /// Anything that is not a complete, consistent bundle of a known version, with what is wrong.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, BundleError> {
+        let (_, metadata) = SafeTensors::read_metadata(bytes)?;
+        let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
+        let json = entry.ok_or(BundleError::NotABundle)?;
+        // The version first: a later header may have fields that this one does not know.
+        #[derive(Deserialize)]
+        struct Version {
+            format: u32,
+        }
+        let version: Version = serde_json::from_str(json).map_err(BundleError::Header)?;
+        if version.format > FORMAT_VERSION {
+            return Err(BundleError::Version { found: version.format });
+        }
+        let header: Header = serde_json::from_str(json).map_err(BundleError::Header)?;
+        check_header(&header)?;
+        Self::new(header, read_network(&SafeTensors::deserialize(bytes)?)?)
+    }
+
+    /// The file's bytes: the same bundle always gives the same.
+    ///
+    /// # Errors
+    /// When the container refuses (it does not for a bundle that was checked).
+    pub fn to_bytes(&self) -> Result<Vec<u8>, BundleError> {
+        let json = serde_json::to_string(&self.header).map_err(BundleError::Header)?;
+        let bytes =
+            |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+        let mut tensors = Vec::new();
+        for (index, layer) in self.network.layers().iter().enumerate() {
+            let (inputs, outputs) = (layer.inputs(), layer.outputs());
+            let shape = vec![CONTROL_POINTS, outputs, inputs];
+            tensors.push((format!("layers.{index}.weight"), shape, bytes(&layer.weights())));
+            let shape = vec![CONTROL_POINTS, outputs];
+            tensors.push((format!("layers.{index}.bias"), shape, bytes(&layer.biases())));
+        }
+        let n = self.network.normalisation();
+        let values = [&n.input_mean, &n.input_std, &n.output_mean, &n.output_std];
+        for (name, values) in NORMALISATION.into_iter().zip(values) {
+            tensors.push((name.to_owned(), vec![values.len()], bytes(values)));
+        }
+        let views = tensors.iter().map(|(name, shape, bytes)| {
+            Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
+        });
+        let views = views.collect::<Result<Vec<_>, SafeTensorError>>()?;
+        let metadata = HashMap::from([(METADATA_KEY.to_owned(), json)]);
+        Ok(safetensors::serialize(views, Some(metadata))?)
+    }
+}
+
+fn check_header(header: &Header) -> Result<(), BundleError> {
+    if header.format > FORMAT_VERSION || header.format == 0 {
+        return Err(BundleError::Version { found: header.format });
+    }
+    let known = [("kind", &header.kind, "pfnn"), ("activation", &header.activation, "elu")];
+    for (what, found, expected) in known {
+        if found != expected {
+            return Err(BundleError::Unknown { what, found: found.clone(), expected });
+        }
+    }
+    if !(header.fps > 0.0 && header.fps.is_finite()) {
+        return Err(BundleError::Fps(header.fps));
+    }
+    Ok(())
+}
+
+fn read_network(tensors: &SafeTensors<'_>) -> Result<Network, BundleError> {
+    let count = (0..).take_while(|i| tensors.tensor(&format!("layers.{i}.weight")).is_ok()).count();
+    let of_layers = (0..count).flat_map(|i| ["weight", "bias"].map(|p| format!("layers.{i}.{p}")));
+    let known: HashSet<_> = of_layers.chain(NORMALISATION.map(String::from)).collect();
+    if let Some(extra) = tensors.names().into_iter().find(|name| !known.contains(*name)) {
+        return Err(BundleError::Extra(extra.into()));
+    }
+    let mut layers = Vec::with_capacity(count);
+    for index in 0..count {
+        let (shape, weights) = floats(tensors, &format!("layers.{index}.weight"))?;
+        let (_, biases) = floats(tensors, &format!("layers.{index}.bias"))?;
+        let [CONTROL_POINTS, outputs, inputs] = shape[..] else {
+            return Err(BundleError::Tensor {
+                tensor: format!("layers.{index}.weight"),
+                expected: "a shape of 4 × outputs × inputs",
+                found: format!("{shape:?}"),
+            });
+        };
+        layers.push(Layer::new(index, inputs, outputs, &weights, &biases)?);
+    }
+    let [input_mean, input_std, output_mean, output_std] =
+        NORMALISATION.map(|name| floats(tensors, name).map(|(_, values)| values));
+    let (input_mean, input_std) = (input_mean?, input_std?);
+    let (output_mean, output_std) = (output_mean?, output_std?);
+    Ok(Network::new(layers, Normalisation { input_mean, input_std, output_mean, output_std })?)
+}
+
+fn floats(tensors: &SafeTensors<'_>, name: &str) -> Result<(Vec<usize>, Vec<f32>), BundleError> {
+    let tensor = tensors.tensor(name).map_err(|_| BundleError::Missing(name.into()))?;
+    if tensor.dtype() != Dtype::F32 {
+        let (tensor, found) = (name.into(), format!("{:?}", tensor.dtype()));
+        return Err(BundleError::Tensor { tensor, expected: "float32", found });
+    }
+    let words = tensor.data().chunks_exact(4);
+    let values = words.map(|word| f32::from_le_bytes(word.try_into().expect("four bytes")));
+    Ok((tensor.shape().to_vec(), values.collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::tests::{network, numbers};
+    use proptest::prelude::*;
+
+    fn header(inputs: usize, outputs: usize) -> Header {
+        Header {
+            format: FORMAT_VERSION,
+            kind: "pfnn".into(),
+            activation: "elu".into(),
+            fps: 60.0,
+            layout: LayoutTable {
+                name: "test".into(),
+                hash: "0".into(),
+                inputs: vec![("a".into(), inputs - 1), ("b".into(), 1)],
+                outputs: vec![("c".into(), outputs)],
+            },
+            licence: "none".into(),
+            provenance: BTreeMap::from([("source".into(), "a test".into())]),
+            parts: BTreeMap::from([("skeleton".into(), serde_json::json!([1, 2]))]),
+        }
+    }
+
+    fn bundle() -> Bundle {
+        Bundle::new(header(19, 11), network(&[19, 8, 8, 11])).unwrap()
+    }
+
+    fn with_header(change: impl FnOnce(&mut Header)) -> Vec<u8> {
+        let mut bundle = bundle();
+        change(&mut bundle.header);
+        bundle.to_bytes().unwrap()
+    }
+
+    #[test]
+    fn a_round_trip_changes_nothing() {
+        let bundle = bundle();
+        let bytes = bundle.to_bytes().unwrap();
+        assert_eq!(bytes, bundle.to_bytes().unwrap(), "the same bytes every time");
+        let back = Bundle::from_bytes(&bytes).unwrap();
+        assert_eq!(back, bundle);
+        assert_eq!(back.to_bytes().unwrap(), bytes);
+        let (x, mut a, mut b) = (numbers(19, 3), vec![0.0; 11], vec![0.0; 11]);
+        bundle.network().predict(&x, 0.3, &mut a, &mut bundle.network().scratch());
+        back.network().predict(&x, 0.3, &mut b, &mut back.network().scratch());
+        assert_eq!(a, b);
+    }
+
+    #[test]
+    fn refuses_and_says_why() {
+        let message = |bytes: &[u8]| Bundle::from_bytes(bytes).unwrap_err().to_string();
+        let later = with_header(|h| h.format = 2);
+        assert_eq!(
+            message(&later),
+            "the bundle is of format 2, this version reads up to 1: update Ambulo"
+        );
+        assert!(message(&with_header(|h| h.kind = "mann".into())).contains("kind 'mann'"));
+        assert!(message(&with_header(|h| h.activation = "relu".into())).contains("'relu'"));
+        assert!(message(&with_header(|h| h.fps = -1.0)).contains("fps"));
+        let layout = message(&with_header(|h| h.layout.inputs[0].1 = 3));
+        assert_eq!(layout, "the layout's inputs blocks sum to 4, the network has 19 inputs");
+        let foreign = safetensors::serialize(Vec::<(&str, TensorView)>::new(), None).unwrap();
+        assert!(message(&foreign).contains("not an Ambulo bundle"));
+        assert!(message(b"").contains("not a safetensors file"));
+        let mut cut = bundle().to_bytes().unwrap();
+        cut.pop();
+        assert!(message(&cut).contains("not a safetensors file"));
+        let mut nan = bundle().to_bytes().unwrap();
+        let end = nan.len();
+        nan[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
+        assert!(message(&nan).contains("expected a finite number"), "{}", message(&nan));
+    }
+
+    #[test]
+    fn refuses_tensors_that_are_missing_or_too_many() {
+        let bytes = bundle().to_bytes().unwrap();
+        let renamed = |from: &str, to: &str| {
+            assert_eq!(from.len(), to.len());
+            let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
+            let mut bytes = bytes.clone();
+            bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+            Bundle::from_bytes(&bytes).unwrap_err().to_string()
+        };
+        assert_eq!(
+            renamed("\"input.mean\"", "\"input.meen\""),
+            "tensor 'input.meen' is not part of this format"
+        );
+        assert_eq!(
+            renamed("\"layers.0.bias\"", "\"layers.9.bias\""),
+            "tensor 'layers.9.bias' is not part of this format"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn never_panics(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+            let _ = Bundle::from_bytes(&bytes);
+        }
+
+        #[test]
+        fn never_panics_on_nearly_right_bytes(at in 0usize..3000, byte in any::<u8>()) {
+            let mut bytes = bundle().to_bytes().unwrap();
+            let at = at % bytes.len();
+            bytes[at] = byte;
+            if let Ok(read) = Bundle::from_bytes(&bytes) {
+                prop_assert!(read.network().layers().len() == 3);
+            }
+        }
+    }
+}
