@@ -1,0 +1,337 @@
+//! One character: fixed steps inside, interpolated poses outside.
+
+use ambulo_features::{Input, Output};
+use ambulo_net::Scratch;
+use ambulo_rig::glam::{Vec2, Vec3};
+use ambulo_rig::{Pose, Transform};
+
+use crate::legs::Leg;
+use crate::trajectory::{Trajectory, yaw};
+use crate::tuning::share;
+use crate::{ControlError, Intent, Model, TrajectoryPoint, Tuning, World};
+
+/// Longest time that one call catches up on, seconds.
+const LONGEST: f32 = 1.0;
+
+/// A joint farther from its root than this is a broken prediction, metres.
+const REACH: f32 = 10.0;
+
+/// Why a pose was held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// `dt` is negative or not finite.
+    Time,
+    /// The intent has a number that is not finite, a facing of length zero, or a strafe outside 0
+    /// to 1.
+    Intent,
+    /// The terrain answered with a height that is not finite.
+    Terrain,
+    /// The network's answer is not finite or not a body.
+    Network,
+}
+
+/// Something that the caller may want to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// Nothing moved: the last good pose is held.
+    Held(Held),
+    /// `dt` was longer than a second; this much of it was left out, seconds.
+    Skipped(f32),
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Fixed steps that ran.
+    pub steps: u32,
+    /// At most one.
+    pub event: Option<Event>,
+}
+
+/// Where a character is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Root {
+    /// On the ground, metres.
+    pub position: Vec3,
+    /// Radians, 0 along +Z, positive towards +X.
+    pub yaw: f32,
+}
+
+/// Everything that one fixed step changes.
+#[derive(Clone, Debug)]
+struct State {
+    trajectory: Trajectory,
+    /// Radians, [0, 2π).
+    phase: f32,
+    /// World frame: what is fed back to the network.
+    positions: Vec<Vec3>,
+    /// World frame, metres a second.
+    velocities: Vec<Vec3>,
+    contacts: [f32; 4],
+    /// Of the pose; the trajectory is one step ahead of it.
+    root: Root,
+    pose: Pose,
+}
+
+impl State {
+    fn copy_from(&mut self, other: &Self) {
+        self.trajectory.clone_from(&other.trajectory);
+        self.phase = other.phase;
+        self.positions.clone_from(&other.positions);
+        self.velocities.clone_from(&other.velocities);
+        self.contacts = other.contacts;
+        self.root = other.root;
+        self.pose.local.clone_from(&other.pose.local);
+    }
+
+    fn is_finite(&self) -> bool {
+        let vectors = self.positions.iter().chain(&self.velocities);
+        let pose = self.pose.local.iter();
+        self.trajectory.is_finite()
+            && self.phase.is_finite()
+            && vectors.clone().all(|v| v.is_finite())
+            && pose.clone().all(|t| t.is_finite())
+    }
+}
+
+/// One character under control of a network.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    model: Model,
+    tuning: Tuning,
+    state: State,
+    /// The state one fixed step ago: to interpolate from, and to fall back to.
+    previous: State,
+    /// Seconds since the last fixed step, in [0, step).
+    since: f64,
+    input: Input,
+    output: Output,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    scratch: Scratch,
+    global: Vec<Transform>,
+    legs: [Option<Leg>; 2],
+}
+
+impl Controller {
+    /// A character that stands at a place (x, z) and faces a yaw, in the network's mean pose.
+    ///
+    /// # Errors
+    /// A tuning or a start with numbers that cannot be used.
+    pub fn new(
+        model: Model,
+        tuning: Tuning,
+        place: Vec2,
+        facing: f32,
+        world: &World<'_>,
+    ) -> Result<Self, ControlError> {
+        if !tuning.is_valid() {
+            return Err(ControlError::Tuning);
+        }
+        let joints = model.layout().joints();
+        let (x, y) = (vec![0.0; model.network().inputs()], vec![0.0; model.network().outputs()]);
+        let direction = Vec2::new(facing.sin(), facing.cos());
+        let state = State {
+            trajectory: Trajectory::standing(place, direction, world),
+            phase: 0.0,
+            positions: vec![Vec3::ZERO; joints],
+            velocities: vec![Vec3::ZERO; joints],
+            contacts: [1.0; 4],
+            root: Root { position: Vec3::ZERO, yaw: facing },
+            pose: model.skeleton().rest_pose(),
+        };
+        let mut controller = Self {
+            tuning,
+            previous: state.clone(),
+            state,
+            since: 0.0,
+            input: Input::zero(joints),
+            output: Output::zero(joints),
+            x,
+            y,
+            scratch: model.network().scratch(),
+            global: vec![Transform::IDENTITY; joints],
+            legs: model.feet().ankles().map(|foot| Leg::above(model.skeleton(), foot)),
+            model,
+        };
+        controller.y.copy_from_slice(&controller.model.network().normalisation().output_mean);
+        controller.model.layout().decode_output(&controller.y, &mut controller.output);
+        controller.take_pose(1.0);
+        if !controller.state.is_finite() {
+            return Err(ControlError::Start);
+        }
+        controller.previous.copy_from(&controller.state);
+        Ok(controller)
+    }
+
+    /// Seconds of a fixed step.
+    pub fn step_time(&self) -> f32 {
+        1.0 / self.model.layout().fps()
+    }
+
+    /// Moves on by `dt` seconds. Allocates nothing.
+    ///
+    /// The poses handed out lag the newest fixed step by up to one step: they lie between the last
+    /// two. On bad input, a bad answer of the terrain or of the network nothing changes but the
+    /// event says so.
+    pub fn step(&mut self, dt: f32, intent: &Intent, world: &World<'_>) -> Step {
+        let held = |reason| Step { steps: 0, event: Some(Event::Held(reason)) };
+        if !(dt.is_finite() && dt >= 0.0) {
+            return held(Held::Time);
+        }
+        if !intent.is_valid() {
+            return held(Held::Intent);
+        }
+        let skipped = (dt - LONGEST).max(0.0);
+        let mut event = (skipped > 0.0).then_some(Event::Skipped(skipped));
+        let step = 1.0 / f64::from(self.model.layout().fps());
+        self.since += f64::from(dt - skipped);
+        let mut steps = 0;
+        // A caller at the very same rate adds up to one step each time but for rounding.
+        while self.since > step * (1.0 - 1e-4) {
+            self.since = (self.since - step).max(0.0);
+            if let Err(reason) = self.fixed_step(intent, world) {
+                self.since = 0.0;
+                event = Some(Event::Held(reason));
+                break;
+            }
+            steps += 1;
+        }
+        Step { steps, event }
+    }
+
+    fn fixed_step(&mut self, intent: &Intent, world: &World<'_>) -> Result<(), Held> {
+        std::mem::swap(&mut self.state, &mut self.previous);
+        self.state.copy_from(&self.previous);
+        let result = self.predict(intent, world);
+        if result.is_err() {
+            // Both become the last good state: the pose stands still.
+            self.state.copy_from(&self.previous);
+        }
+        result
+    }
+
+    fn predict(&mut self, intent: &Intent, world: &World<'_>) -> Result<(), Held> {
+        let dt = self.step_time();
+        self.state.trajectory.follow(intent, &self.tuning, world, dt);
+        self.tell(world);
+        let layout = self.model.layout();
+        layout.encode_input(&self.input, &mut self.x);
+        if !self.x.iter().all(|number| number.is_finite()) {
+            return Err(Held::Terrain);
+        }
+        let network = self.model.network();
+        network.predict(&self.x, self.state.phase, &mut self.y, &mut self.scratch);
+        layout.decode_output(&self.y, &mut self.output);
+        let body = self.output.joint_position.iter().all(|p| p.abs().max_element() < REACH);
+        if !body || !self.y.iter().all(|number| number.is_finite()) {
+            return Err(Held::Network);
+        }
+        self.take_pose(share(self.tuning.pose_halflife, dt));
+        let freedom = self.state.trajectory.freedom();
+        let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
+        self.state.phase =
+            (self.state.phase + std::f32::consts::TAU * cycles).rem_euclid(std::f32::consts::TAU);
+        self.state.trajectory.advance(&self.output, world.areas, dt);
+        if self.state.is_finite() { Ok(()) } else { Err(Held::Network) }
+    }
+
+    /// Fills the network's input from the state.
+    fn tell(&mut self, world: &World<'_>) {
+        let trajectory = &self.state.trajectory;
+        trajectory.sample(world, &mut self.input.trajectory, &mut self.input.ground);
+        let before = trajectory.before();
+        let root = Vec3::new(before.position.x, before.height, before.position.z);
+        let inward = before.rotation().inverse();
+        for (told, position) in self.input.joint_position.iter_mut().zip(&self.state.positions) {
+            *told = inward * (*position - root);
+        }
+        for (told, velocity) in self.input.joint_velocity.iter_mut().zip(&self.state.velocities) {
+            *told = inward * *velocity;
+        }
+    }
+
+    /// Takes the network's pose into the world. What is fed back goes only `share` of the way from
+    /// where its own velocity would have taken it; what is shown is the prediction itself.
+    fn take_pose(&mut self, share: f32) {
+        let dt = self.step_time();
+        let now = *self.state.trajectory.now();
+        let root = Vec3::new(now.position.x, now.height, now.position.z);
+        let outward = now.rotation();
+        self.state.root = Root { position: root, yaw: yaw(now.direction) };
+        for joint in 0..self.global.len() {
+            let position = outward * self.output.joint_position[joint] + root;
+            let velocity = outward * self.output.joint_velocity[joint];
+            let rotation = outward * self.output.joint_rotation[joint];
+            let carried = self.state.positions[joint] + velocity * dt;
+            self.state.positions[joint] = carried.lerp(position, share);
+            self.state.velocities[joint] = velocity;
+            self.global[joint] = Transform::new(position, rotation);
+        }
+        self.state.contacts = self.output.contacts.map(|c| c.clamp(0.0, 1.0));
+        self.set_local();
+    }
+
+    /// The shown pose: the network's rotations on the skeleton's own bones, hung from the hips,
+    /// with legs bent so that the ankles are where the network has them. (Its bones vary in length
+    /// with the pose, so rotations alone would leave the feet centimetres off the ground.)
+    fn set_local(&mut self) {
+        let skeleton = self.model.skeleton();
+        for (index, joint) in skeleton.joints().iter().enumerate() {
+            let own = self.global[index];
+            self.state.pose.local[index] = match joint.parent {
+                Some(parent) => Transform::new(
+                    joint.offset.as_vec3(),
+                    (self.global[parent].rotation.inverse() * own.rotation).normalize(),
+                ),
+                None => own,
+            };
+        }
+        let ankles = self.model.feet().ankles().map(|foot| self.global[foot].translation);
+        self.state.pose.to_global(skeleton, &mut self.global);
+        for (leg, ankle) in self.legs.into_iter().zip(ankles) {
+            if let Some(leg) = leg {
+                leg.reach(skeleton, ankle, &mut self.state.pose, &mut self.global);
+            }
+        }
+    }
+
+    /// Copies the pose at this moment: local transforms, the root joint's in the world.
+    pub fn pose(&self, pose: &mut Pose) {
+        pose.set_interpolated(&self.previous.pose, &self.state.pose, self.share());
+    }
+
+    /// Where the character is at this moment.
+    pub fn root(&self) -> Root {
+        let (a, b) = (self.previous.root, self.state.root);
+        let t = self.share();
+        let turn = (b.yaw - a.yaw + std::f32::consts::PI).rem_euclid(std::f32::consts::TAU)
+            - std::f32::consts::PI;
+        Root { position: a.position.lerp(b.position, t), yaw: a.yaw + turn * t }
+    }
+
+    /// Left heel, left toe, right heel, right toe: how surely each is on the ground, 0 to 1.
+    pub fn contacts(&self) -> [f32; 4] {
+        self.state.contacts
+    }
+
+    /// Radians, [0, 2π): 0 when the right foot comes down, π when the left does.
+    pub fn phase(&self) -> f32 {
+        self.state.phase
+    }
+
+    /// The window around the newest fixed step, for drawing.
+    pub fn trajectory(&self) -> &[TrajectoryPoint] {
+        self.state.trajectory.points()
+    }
+
+    /// The model that moves it.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// How far this moment lies between the last two fixed steps.
+    fn share(&self) -> f32 {
+        (self.since * f64::from(self.model.layout().fps())).clamp(0.0, 1.0) as f32
+    }
+}

@@ -1,0 +1,37 @@
+//! What a player, or a program, wants a character to do.
+
+use ambulo_rig::glam::Vec2;
+
+/// How to move. Standing follows from an asked speed near zero, jumping from a
+/// [`crate::JumpArea`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Gait {
+    /// The default.
+    #[default]
+    Walk,
+    /// Jogging and running are one input of the published network.
+    Jog,
+    /// Knees bent, head low.
+    Crouch,
+}
+
+/// Wishes for this moment; the world's frame, ground plane (x, z).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Intent {
+    /// Asked velocity, metres a second. Below 6 cm/s it means standing.
+    pub velocity: Vec2,
+    /// Where to look while strafing, any length but zero; `None`: along the movement.
+    pub facing: Option<Vec2>,
+    /// 0: face where you go (or stay as you are); 1: face `facing` whatever the movement.
+    pub strafe: f32,
+    /// How to move.
+    pub gait: Gait,
+}
+
+impl Intent {
+    /// Whether every number can be used.
+    pub fn is_valid(&self) -> bool {
+        let facing = self.facing.is_none_or(|f| f.is_finite() && f.length_squared() > 1e-12);
+        self.velocity.is_finite() && facing && (0.0..=1.0).contains(&self.strafe)
+    }
+}

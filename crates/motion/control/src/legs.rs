@@ -1,0 +1,148 @@
+//! Ankles where the network puts them, on bones of the skeleton's own length.
+
+use ambulo_rig::glam::{Quat, Vec3};
+use ambulo_rig::{Pose, Skeleton, Transform};
+
+/// One leg by joint index, from the hip down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Leg {
+    upper: usize,
+    lower: usize,
+    foot: usize,
+}
+
+impl Leg {
+    /// The two bones above a foot; `None` where it has no two.
+    pub fn above(skeleton: &Skeleton, foot: usize) -> Option<Self> {
+        let lower = skeleton.joints()[foot].parent?;
+        let upper = skeleton.joints()[lower].parent?;
+        // The root is not a leg's bone: turning it would turn everything.
+        skeleton.joints()[upper].parent?;
+        Some(Self { upper, lower, foot })
+    }
+
+    /// Bends the leg so that its foot comes to `ankle`, or as near as it can; the foot keeps its
+    /// rotation in the world. `global` holds the pose's transforms and is kept up to date for the
+    /// leg's three joints.
+    pub fn reach(
+        self,
+        skeleton: &Skeleton,
+        ankle: Vec3,
+        pose: &mut Pose,
+        global: &mut [Transform],
+    ) {
+        let place = |joint: usize| global[joint].translation;
+        let (hip, knee, foot) = (place(self.upper), place(self.lower), place(self.foot));
+        let hinge = global[self.lower].rotation * Vec3::NEG_X;
+        let [upper, lower] = two_bone(hip, knee, foot, ankle, hinge);
+        global[self.upper].rotation = (upper * global[self.upper].rotation).normalize();
+        global[self.lower].rotation = (lower * global[self.lower].rotation).normalize();
+        for joint in [self.upper, self.lower, self.foot] {
+            let parent = global[skeleton.joints()[joint].parent.expect("legs hang on something")];
+            let local = parent.rotation.inverse() * global[joint].rotation;
+            pose.local[joint].rotation = local.normalize();
+            global[joint].translation = parent.transform_point(pose.local[joint].translation);
+        }
+    }
+}
+
+/// Turns, in the world, of the upper and the lower bone of a chain a–b–c that bring c to `target`
+/// in the plane in which it bends already; `hinge` is the axis to bend about when it is straight.
+fn two_bone(a: Vec3, b: Vec3, c: Vec3, target: Vec3, hinge: Vec3) -> [Quat; 2] {
+    let (upper, lower) = (a.distance(b), b.distance(c));
+    let nearest = (upper - lower).abs() + 1e-4;
+    let farthest = (upper + lower) * 0.9995;
+    let reach = a.distance(target).clamp(nearest.min(farthest), farthest);
+    if upper < 1e-4 || lower < 1e-4 || a.distance(target) < 1e-4 || a.distance(c) < 1e-4 {
+        return [Quat::IDENTITY; 2];
+    }
+    // Law of cosines: the angles at a and at b, as they are and as they must be.
+    let opposite = |side: f32, p: f32, q: f32| {
+        ((p * p + q * q - side * side) / (2.0 * p * q)).clamp(-1.0, 1.0).acos()
+    };
+    let now = a.distance(c);
+    let at_a = opposite(lower, reach, upper) - opposite(lower, now, upper);
+    let at_b = opposite(reach, upper, lower) - opposite(now, upper, lower);
+    let across = (c - a).cross(b - a);
+    let straight = across.length() < 1e-3 * upper * now;
+    let axis = if straight { hinge.normalize_or(Vec3::X) } else { across.normalize() };
+    let swing = Quat::from_rotation_arc((c - a).normalize(), (target - a).normalize());
+    let upper = swing * Quat::from_axis_angle(axis, at_a);
+    [upper, upper * Quat::from_axis_angle(axis, at_b)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ambulo_rig::Joint;
+    use ambulo_rig::glam::DVec3;
+    use proptest::prelude::*;
+
+    fn leg() -> (Skeleton, Leg) {
+        let joint = |name: &str, parent, y| Joint {
+            name: name.into(),
+            parent,
+            offset: DVec3::new(0.0, y, 0.0),
+            tips: vec![],
+        };
+        let skeleton = Skeleton::new(vec![
+            joint("hips", None, 1.0),
+            joint("thigh", Some(0), -0.1),
+            joint("shin", Some(1), -0.4),
+            joint("foot", Some(2), -0.42),
+        ])
+        .unwrap();
+        let leg = Leg::above(&skeleton, 3).unwrap();
+        (skeleton, leg)
+    }
+
+    #[test]
+    fn only_feet_with_two_bones_below_the_root_have_legs() {
+        let (skeleton, leg) = leg();
+        assert_eq!(leg, Leg { upper: 1, lower: 2, foot: 3 });
+        assert_eq!(Leg::above(&skeleton, 2), None);
+        assert_eq!(Leg::above(&skeleton, 0), None);
+    }
+
+    #[test]
+    fn a_straight_leg_bends_its_knee_forward() {
+        let (skeleton, leg) = leg();
+        let mut pose = skeleton.rest_pose();
+        let mut global = vec![Transform::IDENTITY; 4];
+        pose.to_global(&skeleton, &mut global);
+        leg.reach(&skeleton, Vec3::new(0.0, 0.25, 0.0), &mut pose, &mut global);
+        pose.to_global(&skeleton, &mut global);
+        assert!(global[2].translation.z > 0.1, "{}", global[2].translation);
+        assert!(global[3].translation.abs_diff_eq(Vec3::new(0.0, 0.25, 0.0), 1e-3));
+    }
+
+    proptest! {
+        #[test]
+        fn the_foot_arrives_and_keeps_its_rotation(
+            target in prop::array::uniform3(-0.4..0.4f32), bend in 0.1..1.5f32, turn in -3.0..3.0f32,
+        ) {
+            let (skeleton, leg) = leg();
+            let mut pose = skeleton.rest_pose();
+            pose.local[0].rotation = Quat::from_rotation_y(turn);
+            pose.local[1].rotation = Quat::from_rotation_x(-bend / 2.0);
+            pose.local[2].rotation = Quat::from_rotation_x(bend);
+            pose.local[3].rotation = Quat::from_rotation_z(0.3);
+            let mut global = vec![Transform::IDENTITY; 4];
+            pose.to_global(&skeleton, &mut global);
+            let foot = global[3].rotation;
+            let ankle = Vec3::from_array(target) + Vec3::new(0.0, 0.35, 0.0);
+            prop_assume!(ankle.distance(global[1].translation) > 0.05);
+            leg.reach(&skeleton, ankle, &mut pose, &mut global);
+            let mut again = vec![Transform::IDENTITY; 4];
+            pose.to_global(&skeleton, &mut again);
+            prop_assert!(again[3].rotation.angle_between(foot) < 2e-3);
+            let asked = ankle - global[1].translation;
+            let reach = asked.length().min(0.82 * 0.9995);
+            let expected = global[1].translation + asked.normalize() * reach;
+            prop_assert!(again[3].translation.distance(expected) < 2e-3);
+            for (a, b) in again.iter().zip(&global) {
+                prop_assert!(a.translation.distance(b.translation) < 1e-4, "kept up to date");
+            }
+        }
+    }
+}

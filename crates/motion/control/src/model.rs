@@ -1,0 +1,110 @@
+//! A bundle that a controller can use: its layout and skeleton are checked once.
+
+use std::sync::Arc;
+
+use ambulo_features::{Layout, LayoutError};
+use ambulo_net::{Bundle, Network};
+use ambulo_rig::Skeleton;
+use serde::{Deserialize, Serialize};
+
+/// Why a bundle cannot control a character.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum ControlError {
+    #[error("the bundle has no '{0}' part")]
+    Missing(&'static str),
+    #[error("the bundle's '{part}' part is broken: {reason}")]
+    Broken { part: &'static str, reason: String },
+    #[error("the bundle was made for another layout: {0}")]
+    Layout(#[from] LayoutError),
+    #[error("the bundle runs at {found} steps a second, its layout at {expected}")]
+    Rate { expected: f32, found: f64 },
+    #[error("the tuning has a number that is not finite or has the wrong sign")]
+    Tuning,
+    #[error("the start or the ground under it is not finite")]
+    Start,
+}
+
+/// Which joints stand on the ground, and how high they are then.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Feet {
+    /// Left heel, left toe, right heel, right toe, as the contacts of the output; joint indices.
+    pub joints: [usize; 4],
+    /// Height in metres of those joints above the ground while in contact.
+    pub heights: [f32; 4],
+}
+
+impl Feet {
+    /// The left and the right ankle: the heel's joints.
+    pub fn ankles(&self) -> [usize; 2] {
+        [self.joints[0], self.joints[2]]
+    }
+}
+
+/// A checked bundle; cheap to clone, shared by many characters.
+#[derive(Clone, Debug)]
+pub struct Model {
+    bundle: Arc<Bundle>,
+    layout: Layout,
+    skeleton: Arc<Skeleton>,
+    feet: Feet,
+}
+
+impl Model {
+    /// Checks that this version's layout is the one that the bundle was made for, and that its
+    /// skeleton and feet fit it.
+    ///
+    /// # Errors
+    /// A missing or broken part, or a layout that differs: the first block that does is named.
+    pub fn new(bundle: Arc<Bundle>) -> Result<Self, ControlError> {
+        let header = bundle.header();
+        fn read<T: for<'a> Deserialize<'a>>(
+            bundle: &Bundle,
+            part: &'static str,
+        ) -> Result<T, ControlError> {
+            let value = bundle.header().parts.get(part).ok_or(ControlError::Missing(part))?;
+            T::deserialize(value).map_err(|e| ControlError::Broken { part, reason: e.to_string() })
+        }
+        let skeleton: Skeleton = read(&bundle, "skeleton")?;
+        let feet: Feet = read(&bundle, "feet")?;
+        let table = &header.layout;
+        let layout = Layout::named(&table.name, skeleton.len())?;
+        layout.check(&table.inputs, &table.outputs, &table.hash)?;
+        if header.fps != f64::from(layout.fps()) {
+            return Err(ControlError::Rate { expected: layout.fps(), found: header.fps });
+        }
+        let fits = feet.joints.iter().all(|&joint| joint < skeleton.len())
+            && feet.heights.iter().all(|h| h.is_finite());
+        if !fits {
+            let reason = "a joint that the skeleton does not have, or a height that is not finite";
+            return Err(ControlError::Broken { part: "feet", reason: reason.into() });
+        }
+        Ok(Self { layout, skeleton: Arc::new(skeleton), feet, bundle: bundle.clone() })
+    }
+
+    /// The bundle as it was loaded.
+    pub fn bundle(&self) -> &Bundle {
+        &self.bundle
+    }
+
+    /// Its network.
+    pub fn network(&self) -> &Network {
+        self.bundle.network()
+    }
+
+    /// Meaning of the network's vectors.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// In metres and Ambulo's axes.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+
+    /// Heels and toes.
+    pub fn feet(&self) -> &Feet {
+        &self.feet
+    }
+}
