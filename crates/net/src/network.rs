@@ -1,6 +1,6 @@
 //! Layers, normalisation and the forward pass.
 
-use crate::kernel::{dot4, elu};
+use crate::kernel::{Affine, affine, elu};
 use crate::{CONTROL_POINTS, control_weights};
 
 /// Largest width of a layer: far above any network of this kind, low enough that a broken file
@@ -90,14 +90,9 @@ impl Layer {
         points.flat_map(|p| self.biases.iter().skip(p).step_by(CONTROL_POINTS)).copied().collect()
     }
 
-    fn run(&self, shares: [f32; CONTROL_POINTS], x: &[f32], mut out: impl FnMut(usize, f32)) {
-        let rows = self.weights.chunks_exact(CONTROL_POINTS * self.inputs);
-        let biases = self.biases.chunks_exact(CONTROL_POINTS);
-        for (index, (row, bias)) in rows.zip(biases).enumerate() {
-            let dots = dot4(row, x);
-            let points = 0..CONTROL_POINTS;
-            out(index, points.map(|p| shares[p] * (dots[p] + bias[p])).sum());
-        }
+    fn run(&self, shares: [f32; CONTROL_POINTS], x: &[f32], out: &mut Vec<f32>) {
+        out.resize(self.outputs, 0.0);
+        affine(Affine { weights: &self.weights, biases: &self.biases, shares }, x, out);
     }
 }
 
@@ -178,7 +173,7 @@ impl Network {
 
     /// Buffers for [`Network::predict`].
     pub fn scratch(&self) -> Scratch {
-        let width = self.layers.iter().map(|l| l.outputs).max().unwrap_or(0).max(self.inputs());
+        let width = self.layers.iter().map(|l| l.outputs.max(l.inputs)).max().unwrap_or(0);
         Scratch { from: Vec::with_capacity(width), to: Vec::with_capacity(width) }
     }
 
@@ -196,11 +191,14 @@ impl Network {
         from.extend((0..x.len()).map(|i| (x[i] - n.input_mean[i]) / n.input_std[i]));
         let (last, hidden) = self.layers.split_last().expect("at least one layer");
         for layer in hidden {
-            to.clear();
-            layer.run(shares, from, |_, value| to.push(elu(value)));
+            layer.run(shares, from, to);
+            to.iter_mut().for_each(|value| *value = elu(*value));
             std::mem::swap(from, to);
         }
-        last.run(shares, from, |i, value| y[i] = value * n.output_std[i] + n.output_mean[i]);
+        last.run(shares, from, to);
+        for (i, value) in to.iter().enumerate() {
+            y[i] = value * n.output_std[i] + n.output_mean[i];
+        }
     }
 }
 

@@ -185,13 +185,14 @@ impl Controller {
         let skipped = (dt - LONGEST).max(0.0);
         let mut event = (skipped > 0.0).then_some(Event::Skipped(skipped));
         let step = 1.0 / f64::from(self.model.layout().fps());
+        let before = self.since;
         self.since += f64::from(dt - skipped);
         let mut steps = 0;
         // A caller at the very same rate adds up to one step each time but for rounding.
         while self.since > step * (1.0 - 1e-4) {
             self.since = (self.since - step).max(0.0);
             if let Err(reason) = self.fixed_step(intent, world) {
-                self.since = 0.0;
+                self.since = before;
                 event = Some(Event::Held(reason));
                 break;
             }

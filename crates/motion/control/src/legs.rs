@@ -50,12 +50,14 @@ impl Leg {
 /// in the plane in which it bends already; `hinge` is the axis to bend about when it is straight.
 fn two_bone(a: Vec3, b: Vec3, c: Vec3, target: Vec3, hinge: Vec3) -> [Quat; 2] {
     let (upper, lower) = (a.distance(b), b.distance(c));
+    // Written so that NaN is refused too: clamping needs ordered bounds.
+    let long = |length: f32| length > 1e-4 && length.is_finite();
+    if ![upper, lower, a.distance(target), a.distance(c)].into_iter().all(long) {
+        return [Quat::IDENTITY; 2];
+    }
     let nearest = (upper - lower).abs() + 1e-4;
     let farthest = (upper + lower) * 0.9995;
     let reach = a.distance(target).clamp(nearest.min(farthest), farthest);
-    if upper < 1e-4 || lower < 1e-4 || a.distance(target) < 1e-4 || a.distance(c) < 1e-4 {
-        return [Quat::IDENTITY; 2];
-    }
     // Law of cosines: the angles at a and at b, as they are and as they must be.
     let opposite = |side: f32, p: f32, q: f32| {
         ((p * p + q * q - side * side) / (2.0 * p * q)).clamp(-1.0, 1.0).acos()
@@ -114,6 +116,15 @@ mod tests {
         pose.to_global(&skeleton, &mut global);
         assert!(global[2].translation.z > 0.1, "{}", global[2].translation);
         assert!(global[3].translation.abs_diff_eq(Vec3::new(0.0, 0.25, 0.0), 1e-3));
+    }
+
+    #[test]
+    fn numbers_that_are_none_leave_the_leg_alone() {
+        for bad in [f32::NAN, f32::INFINITY, 1e38] {
+            let far = Vec3::splat(bad);
+            assert_eq!(two_bone(far, far, far, far, Vec3::X), [Quat::IDENTITY; 2]);
+            assert_eq!(two_bone(Vec3::Y, Vec3::ZERO, far, far, Vec3::X), [Quat::IDENTITY; 2]);
+        }
     }
 
     proptest! {

@@ -1,0 +1,418 @@
+//! A controller under a network that is simple enough to know what it must do: one affine layer
+//! that foresees what it is told, and walks and turns along it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ambulo_control::{
+    Areas, ControlError, Controller, Event, Feet, Gait, Held, Intent, Model, Root, Tuning, World,
+};
+use ambulo_features::{Block, Layout, Output};
+use ambulo_net::{Bundle, FORMAT_VERSION, Header, Layer, LayoutTable, Network, Normalisation};
+use ambulo_rig::glam::{DVec3, Quat, Vec2, Vec3};
+use ambulo_rig::{Flat, Joint, Pose, Skeleton, Terrain, Transform};
+
+const STEP: f32 = 1.0 / 60.0;
+
+fn skeleton() -> Skeleton {
+    let joint = |name: &str, parent, offset: [f64; 3]| Joint {
+        name: name.into(),
+        parent,
+        offset: DVec3::from_array(offset),
+        tips: vec![],
+    };
+    Skeleton::new(vec![
+        joint("Hips", None, [0.0, 0.0, 0.0]),
+        joint("LeftUpLeg", Some(0), [0.1, -0.05, 0.0]),
+        joint("LeftLeg", Some(1), [0.0, -0.42, 0.0]),
+        joint("LeftFoot", Some(2), [0.0, -0.42, 0.0]),
+        joint("LeftToe", Some(3), [0.0, -0.05, 0.13]),
+        joint("RightUpLeg", Some(0), [-0.1, -0.05, 0.0]),
+        joint("RightLeg", Some(5), [0.0, -0.42, 0.0]),
+        joint("RightFoot", Some(6), [0.0, -0.42, 0.0]),
+        joint("RightToe", Some(7), [0.0, -0.05, 0.13]),
+    ])
+    .unwrap()
+}
+
+/// What the network draws: a body on knees slightly bent, ankles 9 cm above the ground.
+fn stance() -> Output {
+    let mut output = Output::zero(9);
+    output.phase_rate = 1.0;
+    output.contacts = [0.9, 0.8, 0.2, 0.1];
+    output.joint_position = vec![
+        Vec3::new(0.0, 0.95, 0.0),
+        Vec3::new(0.1, 0.9, 0.0),
+        Vec3::new(0.1, 0.5, 0.08),
+        Vec3::new(0.1, 0.09, 0.0),
+        Vec3::new(0.1, 0.04, 0.13),
+        Vec3::new(-0.1, 0.9, 0.0),
+        Vec3::new(-0.1, 0.5, 0.08),
+        Vec3::new(-0.1, 0.09, 0.0),
+        Vec3::new(-0.1, 0.04, 0.13),
+    ];
+    output
+}
+
+fn at(blocks: &[Block], name: &str, index: usize) -> usize {
+    blocks.iter().find(|block| block.name == name).expect("a block of that name").range.start
+        + index
+}
+
+/// (weights outputs × inputs, biases) of the layer that follows what it is told.
+fn follower(layout: &Layout) -> (Vec<f32>, Vec<f32>) {
+    let (inputs, outputs) = (layout.input_len(), layout.output_len());
+    let mut weights = vec![0.0; inputs * outputs];
+    let mut link = |out: usize, input: usize, weight: f32| weights[out * inputs + input] = weight;
+    let (ins, outs) = (layout.inputs(), layout.outputs());
+    for name in ["trajectory_x", "trajectory_z", "direction_x", "direction_z"] {
+        for sample in 0..6 {
+            link(at(outs, name, sample), at(ins, name, 6 + sample), 1.0);
+        }
+    }
+    // Ten frames ahead lies the next sample.
+    link(at(outs, "root_velocity", 0), at(ins, "trajectory_x", 7), 0.1);
+    link(at(outs, "root_velocity", 1), at(ins, "trajectory_z", 7), 0.1);
+    link(at(outs, "root_yaw", 0), at(ins, "direction_x", 7), -0.1);
+    let mut biases = vec![0.0; outputs];
+    layout.encode_output(&stance(), &mut biases);
+    (weights, biases)
+}
+
+fn header(layout: &Layout) -> Header {
+    let table = |blocks: &[Block]| blocks.iter().map(|b| (b.name.into(), b.range.len())).collect();
+    let feet = Feet { joints: [3, 4, 7, 8], heights: [0.09, 0.04, 0.09, 0.04] };
+    Header {
+        format: FORMAT_VERSION,
+        kind: "pfnn".into(),
+        activation: "elu".into(),
+        fps: 60.0,
+        layout: LayoutTable {
+            name: layout.name().into(),
+            hash: layout.hash(),
+            inputs: table(layout.inputs()),
+            outputs: table(layout.outputs()),
+        },
+        licence: "none: made by a test".into(),
+        provenance: BTreeMap::new(),
+        parts: BTreeMap::from([
+            ("skeleton".into(), serde_json::to_value(skeleton()).unwrap()),
+            ("feet".into(), serde_json::to_value(feet).unwrap()),
+        ]),
+    }
+}
+
+fn bundle(change: impl FnOnce(&mut Header, &mut Vec<f32>, &mut Vec<f32>)) -> Bundle {
+    let layout = Layout::holden(9).unwrap();
+    let (inputs, outputs) = (layout.input_len(), layout.output_len());
+    let (mut weights, mut biases) = follower(&layout);
+    let mut header = header(&layout);
+    change(&mut header, &mut weights, &mut biases);
+    let layer = Layer::new(0, inputs, outputs, &weights.repeat(4), &biases.repeat(4)).unwrap();
+    let mut output_mean = vec![0.0; outputs];
+    layout.encode_output(&stance(), &mut output_mean);
+    // The mean is what a character starts in; the layer's own answer is on top of zero.
+    let biases: Vec<f32> = biases.iter().zip(&output_mean).map(|(b, m)| b - m).collect();
+    let layer = Layer::new(0, inputs, outputs, &layer.weights(), &biases.repeat(4)).unwrap();
+    let normalisation = Normalisation {
+        input_mean: vec![0.0; inputs],
+        input_std: vec![1.0; inputs],
+        output_mean,
+        output_std: vec![1.0; outputs],
+    };
+    Bundle::new(header, Network::new(vec![layer], normalisation).unwrap()).unwrap()
+}
+
+fn model() -> Model {
+    Model::new(Arc::new(bundle(|_, _, _| {}))).unwrap()
+}
+
+fn stroll(world: &World<'_>) -> Controller {
+    Controller::new(model(), Tuning::default(), Vec2::ZERO, 0.0, world).unwrap()
+}
+
+/// A wish that changes all the time, as a player's does.
+fn wandering(time: f32) -> Intent {
+    let angle = 0.8 * (time * 0.7).sin();
+    Intent { velocity: Vec2::new(angle.sin(), angle.cos()) * 1.4, ..Intent::default() }
+}
+
+fn globals(controller: &Controller) -> Vec<Transform> {
+    let skeleton = controller.model().skeleton();
+    let mut pose = skeleton.rest_pose();
+    controller.pose(&mut pose);
+    let mut global = vec![Transform::IDENTITY; skeleton.len()];
+    pose.to_global(skeleton, &mut global);
+    global
+}
+
+#[test]
+fn goes_and_faces_where_it_is_asked_to() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.3), areas: &areas };
+    let mut character = stroll(&world);
+    let intent = Intent { velocity: Vec2::new(1.5, 0.0), ..Intent::default() };
+    for _ in 0..300 {
+        assert_eq!(character.step(STEP, &intent, &world).steps, 1);
+    }
+    let before = character.root();
+    for _ in 0..60 {
+        character.step(STEP, &intent, &world);
+    }
+    let root = character.root();
+    assert!((root.position.x - before.position.x - 1.5).abs() < 0.1, "{root:?}");
+    assert!((root.position.z - before.position.z).abs() < 0.1);
+    assert!((root.yaw - std::f32::consts::FRAC_PI_2).abs() < 0.05, "faces +X: {}", root.yaw);
+    assert!((root.position.y - 0.3).abs() < 1e-5, "on the ground");
+    assert_eq!(character.contacts(), [0.9, 0.8, 0.2, 0.1]);
+}
+
+#[test]
+fn strafing_faces_elsewhere_and_standing_stops() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let mut character = stroll(&world);
+    let intent = Intent {
+        velocity: Vec2::new(0.0, 1.0),
+        facing: Some(Vec2::new(1.0, 0.0)),
+        strafe: 1.0,
+        gait: Gait::Walk,
+    };
+    for _ in 0..400 {
+        character.step(STEP, &intent, &world);
+    }
+    assert!((character.root().yaw - std::f32::consts::FRAC_PI_2).abs() < 0.05);
+    for _ in 0..600 {
+        character.step(STEP, &Intent::default(), &world);
+    }
+    let before = character.root();
+    character.step(STEP, &Intent::default(), &world);
+    assert!(character.root().position.distance(before.position) < 1e-3, "stands");
+}
+
+/// The ankles of the shown pose are where the network has them, on bones of the skeleton's length.
+#[test]
+fn feet_are_where_the_network_puts_them() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.25), areas: &areas };
+    let character = stroll(&world);
+    let global = globals(&character);
+    for (joint, x) in [(3, 0.1), (7, -0.1)] {
+        let expected = Vec3::new(x, 0.09 + 0.25, 0.0);
+        assert!(global[joint].translation.abs_diff_eq(expected, 1e-3), "{:?}", global[joint]);
+        let shin = global[joint].translation.distance(global[joint - 1].translation);
+        assert!((shin - 0.42).abs() < 1e-4, "the bone keeps its length");
+        assert!(global[joint - 1].translation.z > 0.02, "the knee bends forward");
+    }
+}
+
+#[test]
+fn every_rate_walks_the_same_path() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let walk = |next: &mut dyn FnMut() -> f32| -> Vec<(f32, Root)> {
+        let mut character = stroll(&world);
+        let mut time = 0.0;
+        let mut path = vec![];
+        while time < 20.0 {
+            let dt = next();
+            character.step(dt, &wandering(time), &world);
+            time += dt;
+            path.push((time, character.root()));
+        }
+        path
+    };
+    let reference = walk(&mut || STEP);
+    let length: f32 = reference.windows(2).map(|w| w[0].1.position.distance(w[1].1.position)).sum();
+    assert!(length > 20.0);
+    let mut state = 7u32;
+    let mut irregular = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        0.002 + (state >> 16) as f32 / 65536.0 * 0.05
+    };
+    for (name, path) in [
+        ("30", walk(&mut || 1.0 / 30.0)),
+        ("144", walk(&mut || 1.0 / 144.0)),
+        ("irregular", walk(&mut irregular)),
+    ] {
+        for (time, root) in path.iter().filter(|(time, _)| *time > 0.1 && *time < 19.9) {
+            let index = (time / STEP - 1.0).round() as usize;
+            let away = root.position.distance(reference[index].1.position);
+            // Half a frame of walking, and one per cent of the path.
+            assert!(away < 0.012 + 0.01 * length, "{name} at {time}: {away}");
+        }
+        let (time, last) = path.last().unwrap();
+        let end = reference.last().unwrap().1;
+        assert!(last.position.distance(end.position) < 0.01 * length, "{name} at {time}");
+    }
+}
+
+#[test]
+fn poses_between_steps_are_interpolated() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let mut character = stroll(&world);
+    let intent = wandering(0.0);
+    for _ in 0..120 {
+        character.step(STEP, &intent, &world);
+    }
+    let start = character.root().position;
+    let quarter = character.step(STEP / 4.0, &intent, &world);
+    assert_eq!(quarter.steps, 0);
+    let after = character.root().position;
+    for _ in 0..3 {
+        character.step(STEP / 4.0, &intent, &world);
+    }
+    let whole = character.root().position;
+    assert!((after.distance(start) / whole.distance(start) - 0.25).abs() < 0.02);
+}
+
+struct Broken;
+
+impl Terrain for Broken {
+    fn height(&self, _: f32, _: f32) -> f32 {
+        f32::NAN
+    }
+}
+
+/// Bad input holds the last good pose, says so, and leaves no trace.
+#[test]
+fn bad_input_never_enters_the_state() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let broken = World { terrain: &Broken, areas: &areas };
+    let (mut disturbed, mut calm) = (stroll(&world), stroll(&world));
+    let nan = Intent { velocity: Vec2::new(f32::NAN, 0.0), ..Intent::default() };
+    let no_facing = Intent { facing: Some(Vec2::ZERO), ..Intent::default() };
+    let strafe = Intent { strafe: 2.0, ..Intent::default() };
+    let held = |reason| Some(Event::Held(reason));
+    for frame in 0..240 {
+        let intent = wandering(frame as f32 * STEP);
+        let before = globals(&disturbed);
+        for bad in [nan, no_facing, strafe] {
+            assert_eq!(disturbed.step(STEP, &bad, &world).event, held(Held::Intent));
+        }
+        for dt in [f32::NAN, f32::INFINITY, -0.1] {
+            assert_eq!(disturbed.step(dt, &intent, &world).event, held(Held::Time));
+        }
+        assert_eq!(globals(&disturbed), before, "the pose is held");
+        if frame == 120 {
+            assert_eq!(disturbed.step(STEP, &intent, &broken).event, held(Held::Terrain));
+        }
+        assert_eq!(disturbed.step(STEP, &intent, &world).event, None);
+        calm.step(STEP, &intent, &world);
+        assert_eq!(disturbed.root(), calm.root());
+        assert_eq!(globals(&disturbed), globals(&calm), "as if nothing had happened");
+    }
+}
+
+#[test]
+fn a_network_that_explodes_is_held() {
+    let layout = Layout::holden(9).unwrap();
+    let head = at(layout.outputs(), "joint_position", 12);
+    let wild = at(layout.inputs(), "trajectory_z", 11);
+    let inputs = layout.input_len();
+    // Walking makes one joint fly off; standing does not.
+    let exploding = bundle(|_, weights, _| weights[head * inputs + wild] = 1e3);
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let model = Model::new(Arc::new(exploding)).unwrap();
+    let mut character = Controller::new(model, Tuning::default(), Vec2::ZERO, 0.0, &world).unwrap();
+    assert_eq!(character.step(STEP, &Intent::default(), &world).event, None);
+    let mut reasons = vec![];
+    for _ in 0..60 {
+        reasons.push(character.step(STEP, &wandering(0.0), &world).event);
+        assert!(globals(&character).iter().all(|t| t.is_finite() && t.translation.length() < 10.0));
+    }
+    assert_eq!(*reasons.last().unwrap(), Some(Event::Held(Held::Network)));
+}
+
+#[test]
+fn long_pauses_are_cut() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let mut character = stroll(&world);
+    let step = character.step(3.0, &wandering(0.0), &world);
+    assert_eq!(step.steps, 60);
+    assert_eq!(step.event, Some(Event::Skipped(2.0)));
+    assert_eq!(character.step(0.0, &wandering(0.0), &world).steps, 0);
+}
+
+#[test]
+fn the_callers_pose_is_a_copy() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let (mut touched, mut left_alone) = (stroll(&world), stroll(&world));
+    let mut pose = Pose { local: vec![] };
+    for _ in 0..30 {
+        touched.step(STEP, &wandering(1.0), &world);
+        left_alone.step(STEP, &wandering(1.0), &world);
+        touched.pose(&mut pose);
+        pose.local.iter_mut().for_each(|t| t.rotation = Quat::from_rotation_x(1.0));
+    }
+    assert_eq!(globals(&touched), globals(&left_alone));
+}
+
+#[test]
+fn refuses_bundles_that_do_not_fit() {
+    let refused = |change: fn(&mut Header, &mut Vec<f32>, &mut Vec<f32>)| {
+        Model::new(Arc::new(bundle(change))).unwrap_err()
+    };
+    let swapped = refused(|header, _, _| header.layout.inputs.swap(0, 1));
+    assert_eq!(
+        swapped.to_string(),
+        "the bundle was made for another layout: input block 0 is 'trajectory_z (12)', this \
+         version expects 'trajectory_x (12)'"
+    );
+    let hash = refused(|header, _, _| header.layout.hash = "0".into());
+    assert!(matches!(hash, ControlError::Layout(_)));
+    let name = refused(|header, _, _| header.layout.name = "mann".into());
+    assert!(name.to_string().contains("'mann' is not known"));
+    let rate = refused(|header, _, _| header.fps = 30.0);
+    assert!(matches!(rate, ControlError::Rate { .. }));
+    let bare = refused(|header, _, _| {
+        header.parts.remove("skeleton");
+    });
+    assert!(matches!(bare, ControlError::Missing("skeleton")));
+    let feet =
+        refused(|header, _, _| header.parts.get_mut("feet").unwrap()["joints"][0] = 99.into());
+    assert!(matches!(feet, ControlError::Broken { part: "feet", .. }));
+    let loops = refused(|header, _, _| {
+        header.parts.get_mut("skeleton").unwrap()[1]["parent"] = 5.into();
+    });
+    assert!(loops.to_string().contains("parent must come before"), "{loops}");
+}
+
+#[test]
+fn refuses_starts_and_tunings_that_cannot_be_used() {
+    let areas = Areas::default();
+    let broken = World { terrain: &Broken, areas: &areas };
+    let start = Controller::new(model(), Tuning::default(), Vec2::ZERO, 0.0, &broken);
+    assert!(matches!(start, Err(ControlError::Start)));
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let tuning = Tuning { pose_halflife: -1.0, ..Tuning::default() };
+    let tuned = Controller::new(model(), tuning, Vec2::ZERO, 0.0, &world);
+    assert!(matches!(tuned, Err(ControlError::Tuning)));
+}
+
+/// The same wishes give the same bits, in every build: this hash changes only with the arithmetic.
+/// (Sine, cosine and powers come from the system's mathematics library, hence the one platform.)
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64", target_env = "gnu"))]
+fn a_walk_has_a_golden_hash() {
+    let hills = ambulo_rig::HeightField::hills(11, 60.0, 2.0).unwrap();
+    let areas = Areas::default();
+    let world = World { terrain: &hills, areas: &areas };
+    let mut character = stroll(&world);
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    for frame in 0..900 {
+        character.step(STEP, &wandering(frame as f32 * STEP), &world);
+        for transform in globals(&character) {
+            let numbers = transform.translation.to_array().into_iter();
+            for number in numbers.chain(transform.rotation.to_array()) {
+                hash = (hash ^ u64::from(number.to_bits())).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+    }
+    assert_eq!(format!("{hash:016x}"), "b233a2795f65fc0c");
+}
