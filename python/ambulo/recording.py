@@ -6,8 +6,9 @@ faces +Z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ Floats = NDArray[np.floating]
 Ints = NDArray[np.integer]
 
 
-class Terrain(Protocol):
+class Heights(Protocol):
     """The ground as a height field."""
 
     def height(self, x: Floats, z: Floats) -> Floats:
@@ -101,3 +102,19 @@ class Recording:
     def frames(self) -> int:
         """T."""
         return len(self.positions)
+
+    def without_joints(self) -> Recording:
+        """The same path with no joints and no tips."""
+        none: dict[str, Any] = {"names": (), "parents": (), "tip_joints": ()}
+        return replace(self, positions=self.positions[:, :0], tips=self.tips[:, :0], **none)
+
+    @classmethod
+    def joined(cls, recordings: Sequence[Recording]) -> Recording:
+        """One after the other, paths only: what maps are drawn from."""
+        paths = [recording.without_joints() for recording in recordings]
+        per_frame = ("positions", "tips", "root", "facing", "gait", "leg", "lap", "contacts")
+        whole = {
+            name: np.concatenate([getattr(path, name) for path in paths])
+            for name in (*per_frame, "asked")
+        }
+        return replace(paths[0], **whole)

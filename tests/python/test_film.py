@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ambulo import film_files
-from ambulo.drawing import Camera, Cones, draw_cones, unit
-from ambulo.film import write_film, write_filmstrip
-from ambulo.film_files import shared_palette
-from ambulo.ground import _lines, cast_shadow, draw_ground, lay_shadow
-from ambulo.mannequin import LEFT, RIGHT, landmarks
-from ambulo.pictures import write_top_view
+from ambulo.pictures import encode as film_files
+from ambulo.pictures.drawing import Camera, Cones, draw_cones, unit
+from ambulo.pictures.encode import shared_palette
+from ambulo.pictures.film import write_film, write_filmstrip
+from ambulo.pictures.ground import _lines, cast_shadow, draw_ground, lay_shadow
+from ambulo.pictures.mannequin import LEFT, RIGHT, landmarks
+from ambulo.pictures.stage import Stage, follow, place_camera, smooth
+from ambulo.pictures.top_view import write_top_view
 from ambulo.recording import Flat, Floats, Recording
-from ambulo.stage import Stage, follow, place_camera, smooth
 
 FPS = 30.0
 SIZE = (160, 120)
@@ -433,7 +433,7 @@ def test_filmstrip_shows_one_cycle_to_the_right(tmp_path: Path) -> None:
         head, margin = round(190 * unit), round(24 * unit)
         assert image.size == (head + 4 * 120 + margin, 2 * margin + 2 * 180 + round(12 * unit))
         sheet = np.asarray(image.convert("RGB"), np.float64)
-    from ambulo.film import _cycle
+    from ambulo.pictures.film import _cycle
 
     stage = Stage(recording, Flat(), np.zeros((0, 2)))
     first, span = _cycle(stage, 0, 90)

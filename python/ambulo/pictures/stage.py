@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from ambulo.drawing import NEAR, Array, Camera, Cones, Pixels, draw_cones
-from ambulo.ground import HAZE, HORIZON, GroundView, cast_shadow, draw_ground, lay_shadow
-from ambulo.mannequin import Mannequin
-from ambulo.recording import Floats, Recording, Terrain
+from ambulo.pictures.drawing import NEAR, Array, Camera, Cones, Pixels, draw_cones
+from ambulo.pictures.ground import HAZE, HORIZON, GroundView, cast_shadow, draw_ground, lay_shadow
+from ambulo.pictures.mannequin import Mannequin
+from ambulo.recording import Floats, Heights, Recording
 
 Picture = NDArray[np.uint8]
 
@@ -76,7 +76,7 @@ def follow(
     recording: Recording,
     frames: ArrayLike,
     stature: float,
-    terrain: Terrain,
+    terrain: Heights,
     size: tuple[int, int],
     view: float,
 ) -> list[Camera]:
@@ -109,7 +109,7 @@ def between(values: ArrayLike, frames: Floats) -> Array:
     return values[low] * (1.0 - part) + values[high] * part
 
 
-def heights(terrain: Terrain, points: Floats) -> Array:
+def heights(terrain: Heights, points: Floats) -> Array:
     """Heights (N,) at ground points x, z (N, 2)."""
     return np.asarray(terrain.height(points[:, 0], points[:, 1]), np.float64)
 
@@ -122,7 +122,7 @@ class Stage:
     """Everything that stays the same from picture to picture."""
 
     recording: Recording
-    terrain: Terrain
+    terrain: Heights
     waypoints: Array
     """(M, 2) x, z; M may be 0."""
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ambulo.drawing import Array
-from ambulo.film_files import replacing
+from ambulo.pictures.drawing import Array
+from ambulo.pictures.encode import replacing
 from ambulo.recording import Recording
 
 if TYPE_CHECKING:
@@ -91,12 +91,12 @@ def _extent(recording: Recording, points: Array, radii: Array) -> tuple[Array, A
 
 
 def _draw_track(axes: Axes, points: Array, radii: Array) -> None:
-    """The waypoints, numbered from 1, and the straight lines between them."""
+    """The waypoints, numbered from 0, and the straight lines between them."""
     from matplotlib.patches import Circle
 
     closed = np.concatenate([points, points[:1]])
     axes.plot(closed[:, 0], closed[:, 1], color="#c9ccd1", lw=1.0, ls=(0, (5, 4)), zorder=1)
-    for number, (point, radius) in enumerate(zip(points, radii, strict=True), 1):
+    for number, (point, radius) in enumerate(zip(points, radii, strict=True)):
         centre = (float(point[0]), float(point[1]))
         axes.add_patch(Circle(centre, float(radius), fc=ACCENT, alpha=0.13, lw=0, zorder=1.5))
         axes.add_patch(Circle(centre, float(radius), fill=False, ec=ACCENT, lw=1.0, zorder=2))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ambulo.drawing import Array, Cones, unit
-from ambulo.recording import Recording, Terrain
+from ambulo.pictures.drawing import Array, Cones, unit
+from ambulo.recording import Heights, Recording
 
 BODY = (0.56, 0.59, 0.64)
 LEFT = (0.88, 0.63, 0.44)
@@ -108,7 +108,7 @@ class _Heap:
 class Mannequin:
     """The body of one recording's character, measured once and posed every frame."""
 
-    def __init__(self, recording: Recording, terrain: Terrain) -> None:
+    def __init__(self, recording: Recording, terrain: Heights) -> None:
         self.parents = recording.parents
         self.tip_joints = recording.tip_joints
         self.marks = landmarks(recording.names)

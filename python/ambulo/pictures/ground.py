@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ambulo.drawing import NEAR, Array, Camera, Cones, Pixels, unit
-from ambulo.recording import Flat, Floats, Terrain
+from ambulo.pictures.drawing import NEAR, Array, Camera, Cones, Pixels, unit
+from ambulo.recording import Flat, Floats, Heights
 
 FAR = 90.0  # metres: all fog from here
 HAZE = 30.0  # metres: what is this far has kept 1 / e of its colour
@@ -40,7 +40,7 @@ class GroundView:
     top: int
 
 
-def draw_ground(camera: Camera, terrain: Terrain, sun: Array, *, grid: bool = True) -> GroundView:
+def draw_ground(camera: Camera, terrain: Heights, sun: Array, *, grid: bool = True) -> GroundView:
     """Sky, ground and its metre grid; `sun` (3,) is the way the light travels."""
     if isinstance(terrain, Flat):
         x, y, z, depth, top = _level_points(camera, terrain.level)
@@ -92,7 +92,7 @@ def _level_points(camera: Camera, level: float) -> tuple:
     return x, np.full((1, 1), level, np.float32), z, depth, top
 
 
-def _field_points(camera: Camera, terrain: Terrain) -> tuple:
+def _field_points(camera: Camera, terrain: Heights) -> tuple:
     """x, y, z, depth and slopes of the height field at every pixel; depth is FAR for sky.
 
     A picture column is a vertical plane (the camera looks level), so each column is walked from

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 
-from ambulo.drawing import Array, Camera, Pixels
-from ambulo.film_files import open_film, replacing
-from ambulo.recording import Flat, Floats, Recording, Terrain
-from ambulo.stage import (
+from ambulo.pictures.drawing import Array, Camera, Pixels
+from ambulo.pictures.encode import open_film, replacing
+from ambulo.pictures.stage import (
     ACCENT,
     INK,
     PAPER,
@@ -32,6 +31,7 @@ from ambulo.stage import (
     font,
     to_bytes,
 )
+from ambulo.recording import Flat, Floats, Heights, Recording
 
 Shot = tuple[int, int, str]
 Progress = Callable[[int, int], object]
@@ -56,7 +56,7 @@ def write_film(
     recording: Recording,
     shots: Sequence[Shot],
     *,
-    terrain: Terrain | None = None,
+    terrain: Heights | None = None,
     waypoints: ArrayLike = (),
     size: tuple[int, int] = (640, 360),
     fps: int = 25,
@@ -163,7 +163,7 @@ def write_filmstrip(
     recording: Recording,
     shots: Sequence[Shot],
     *,
-    terrain: Terrain | None = None,
+    terrain: Heights | None = None,
     poses: int = 8,
     cell: tuple[int, int] = (180, 270),
 ) -> Path:

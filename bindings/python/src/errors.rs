@@ -1,0 +1,41 @@
+//! Rust errors as Python exceptions: the one place where they are mapped.
+
+use std::io;
+
+use ambulo_formats::files::FileError;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+pyo3::create_exception!(
+    ambulo,
+    MotionFileError,
+    PyValueError,
+    "A motion file that is refused. `line` and `column`, both from 1, and the texts `expected` and \
+     `found` say where and why; all are None where the file as a whole is meant."
+);
+
+/// Input that cannot be used: `ValueError`, with the error's own words.
+pub fn value_error(error: impl std::fmt::Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// A path that cannot be read or written: `OSError` as Python itself has it, else
+/// `MotionFileError`.
+pub fn file_error(py: Python<'_>, error: FileError) -> PyErr {
+    let text = error.to_string();
+    let place = match error {
+        FileError::Io { source, .. } => return io::Error::new(source.kind(), text).into(),
+        FileError::Read(place) => Some(place),
+        _ => None,
+    };
+    let error = MotionFileError::new_err(text);
+    let value = error.value(py);
+    let (line, column) = place.as_ref().map(|p| (p.line, p.column)).unzip();
+    let (expected, found) = place.map(|p| (p.expected, p.found)).unzip();
+    let set = value
+        .setattr("line", line)
+        .and_then(|()| value.setattr("column", column))
+        .and_then(|()| value.setattr("expected", expected))
+        .and_then(|()| value.setattr("found", found));
+    set.err().unwrap_or(error)
+}

@@ -1,0 +1,21 @@
+//! The Python package's native module: a shell around the crates, no logic of its own.
+
+mod character;
+mod errors;
+mod model;
+mod motion;
+
+use pyo3::prelude::*;
+
+/// Ambulo's Rust core.
+#[pymodule]
+mod _core {
+    #[pymodule_export]
+    use crate::character::{Controller, Terrain};
+    #[pymodule_export]
+    use crate::errors::MotionFileError;
+    #[pymodule_export]
+    use crate::model::{Model, layout};
+    #[pymodule_export]
+    use crate::motion::{Clip, motion_axes, read_motion, write_motion};
+}

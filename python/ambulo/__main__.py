@@ -1,0 +1,6 @@
+"""`python -m ambulo` is `ambulo`."""
+
+from ambulo.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""The command line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from ambulo.cli.character import demo, import_, model, walk
+from ambulo.cli.motion import motion
+
+EPILOG = """Examples:
+
+\b
+  ambulo import holden NETWORK-FOLDER -o model.safetensors
+  ambulo walk model.safetensors -o out/walk
+  ambulo motion convert captures/ out/ --fps 60 --mirror
+
+Exit codes: 0 done, 1 something failed and was named, 2 wrong usage, 130 stopped by Ctrl-C."""
+
+
+class _Group(click.Group):
+    """Errors that a user can mend become one line, not a traceback."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.exceptions.Exit, click.Abort):
+            # Click's own ways out; they are RuntimeErrors, too.
+            raise
+        except (ValueError, OSError, RuntimeError) as error:
+            if ctx.obj and ctx.obj.get("debug"):
+                raise
+            raise click.ClickException(str(error)) from error
+
+
+@click.group(
+    cls=_Group,
+    epilog=EPILOG,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(package_name="ambulo")
+@click.option("--debug", is_flag=True, help="Show tracebacks instead of one-line errors.")
+@click.pass_context
+def cli(ctx: click.Context, debug: bool) -> None:
+    """Ambulo: character animation that is learned."""
+    ctx.obj = {"debug": debug}
+
+
+@cli.command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    r"""Print a completion script for SHELL.
+
+    \b
+    Example (bash):
+      ambulo completion bash > ~/.local/share/bash-completion/completions/ambulo
+    """
+    from click.shell_completion import get_completion_class
+
+    found = get_completion_class(shell)
+    if found is None:
+        raise click.ClickException(f"this version of click has no completion for {shell}")
+    click.echo(found(cli, {}, "ambulo", "_AMBULO_COMPLETE").source())
+
+
+for command in (demo, import_, model, motion, walk):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """Entry point of the `ambulo` command."""
+    cli(prog_name="ambulo")

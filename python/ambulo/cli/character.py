@@ -1,0 +1,271 @@
+"""Commands that use a model: import, look, walk, and the demo."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from ambulo.cli.progress import bar
+from ambulo.evaluate.outputs import write_outputs
+from ambulo.evaluate.track import Track, load_track
+from ambulo.evaluate.walk import Lap, summarise, walk_laps
+from ambulo.files import write_atomic
+from ambulo.model import Model, load_model
+from ambulo.terrain import Terrain
+
+STOPPED = 130
+
+
+@click.group(name="import")
+def import_() -> None:
+    """Turn other projects' weights into a model."""
+
+
+@import_.command(name="holden")
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    help="The model to write (.safetensors).",
+)  # fmt: skip
+@click.option(
+    "--skeleton", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="BVH file with the rest pose. Default: rest.bvh beside the weights, else bones as the "
+    "network itself draws them.",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace OUTPUT if it exists.")
+@click.option("--dry-run", is_flag=True, help="Check everything, write nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+def import_holden_(
+    folder: Path,
+    output: Path,
+    skeleton: Path | None,
+    overwrite: bool,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    r"""Import the PFNN authors' weights from FOLDER (W0_000.bin …).
+
+    Any four or more of the 50 slices do; with more than four the files are checked against each
+    other.
+
+    \b
+    Example:
+      ambulo import holden network/ -o holden.safetensors
+    """
+    from ambulo.holden import import_holden
+
+    _may_write(output, overwrite)
+    imported = import_holden(folder, skeleton)
+    if not dry_run:
+        imported.model.save(output)
+    report = {
+        "output": None if dry_run else str(output),
+        "slices": list(imported.slices),
+        "residual": imported.residual,
+        "amplification": imported.amplification,
+        **imported.model.info(),
+    }
+    if as_json:
+        click.echo(json.dumps(report, indent=2))
+        return
+    fit = "not checked (four slices always fit)"
+    if imported.residual is not None:
+        fit = f"misfit {imported.residual:.1e} of the largest weight"
+    click.echo(f"{len(imported.slices)} slices, {fit}; skeleton from {imported.skeleton}")
+    click.echo(f"licence: {imported.model.header['licence']}")
+    click.echo("dry run: nothing written" if dry_run else f"wrote {output}")
+
+
+@click.group()
+def model() -> None:
+    """Look at models."""
+
+
+@model.command(name="info")
+@click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def model_info(path: Path, as_json: bool) -> None:
+    r"""Say what MODEL is: its network, layout, licence and origin.
+
+    \b
+    Example:
+      ambulo model info model.safetensors --json
+    """
+    info = load_model(path).info()
+    if as_json:
+        click.echo(json.dumps(info, indent=2))
+        return
+    for key, value in info.items():
+        if isinstance(value, dict):
+            for inner, text in value.items():
+                click.echo(f"{inner:>12}  {text}")
+        else:
+            click.echo(f"{key:>12}  {value}")
+
+
+@click.command()
+@click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
+@click.option("--track", default="seeds", show_default=True, help="'seeds' or a TOML file.")
+@click.option("--laps", default=1, show_default=True, type=click.IntRange(1, 10_000))
+@click.option(
+    "--terrain", default="flat", show_default=True, help="'flat', 'hills' or a height map file."
+)
+@click.option("--seed", default=0, show_default=True, help="Seed of the hills.")
+@click.option("--responsive", is_flag=True, help="Follow wishes sooner; feet slide a little more.")
+@click.option(
+    "-o", "--output", type=click.Path(file_okay=False, path_type=Path),
+    help="Folder for the motion (BVH), pictures (PNG), film and summary.json. "
+    "Without it nothing is written.",
+)  # fmt: skip
+@click.option(
+    "--film", default="gif", show_default=True, type=click.Choice(["gif", "mp4", "none"]),
+    help="mp4 needs ffmpeg on the PATH.",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def walk(
+    path: Path,
+    track: str,
+    laps: int,
+    terrain: str,
+    seed: int,
+    responsive: bool,
+    output: Path | None,
+    film: str,
+    as_json: bool,
+) -> None:
+    r"""Walk MODEL's character around a track and measure it.
+
+    MODEL is a .safetensors file or a folder of the PFNN authors' weights. Motion, pictures and
+    film show the first lap; the figures cover all. Ctrl-C keeps the laps that are finished.
+
+    \b
+    Examples:
+      ambulo walk model.safetensors --laps 19 --json
+      ambulo walk model.safetensors --terrain hills --seed 3 -o out/hills
+    """
+    _walk(
+        load_model(path), load_track(track), Terrain.named(terrain, seed), terrain, laps,
+        responsive=responsive, output=output, film=film, as_json=as_json,
+    )  # fmt: skip
+
+
+@click.command()
+@click.option(
+    "-o", "--output", default="out/demo", show_default=True,
+    type=click.Path(file_okay=False, path_type=Path), help="Folder to write.",
+)  # fmt: skip
+def demo(output: Path) -> None:
+    r"""Show the main job: a trained character walks the seeds' track.
+
+    Uses the PFNN authors' network from $AMBULO_DATA (default: ../shared/data).
+
+    \b
+    Example:
+      AMBULO_DATA=~/motion ambulo demo -o out/demo
+    """
+    data = Path(os.environ.get("AMBULO_DATA") or "../shared/data")
+    network = data / "holden-pfnn" / "network"
+    if not network.is_dir():
+        click.echo(
+            f"There is no trained network at {network}, so there is nothing to show. Get the "
+            "authors' weights (demo/network/pfnn in the download of the PFNN paper, "
+            "theorangeduck.com/page/phase-functioned-neural-networks-character-control), put the "
+            ".bin files there, or name the folder above holden-pfnn in $AMBULO_DATA."
+        )
+        return
+    click.echo(f"Importing {network}")
+    character = load_model(network)
+    click.echo(f"Walking the seeds' track. {character.header['licence']}")
+    _walk(
+        character, load_track("seeds"), Terrain.flat(), "flat", 1,
+        responsive=False, output=output, film="gif", as_json=False,
+    )  # fmt: skip
+
+
+def _walk(
+    character: Model,
+    track: Track,
+    ground: Terrain,
+    ground_name: str,
+    laps: int,
+    *,
+    responsive: bool,
+    output: Path | None,
+    film: str,
+    as_json: bool,
+) -> None:
+    started = time.perf_counter()
+    finished: list[Lap] = []
+    stopped = False
+    with bar("walking", laps, unit="laps") as progress:
+        try:
+            for lap in walk_laps(
+                character, track, ground, laps, responsive=responsive, on_progress=progress
+            ):
+                # The first lap is shown in full; of the others the figures and the path are enough.
+                finished.append(lap if not finished else lap.without_motion())
+        except KeyboardInterrupt:
+            stopped = True
+    if not finished:
+        raise click.exceptions.Exit(STOPPED)
+    summary = {
+        "terrain": ground_name,
+        "laps_asked": laps,
+        "wall_s": time.perf_counter() - started,
+        "licence": character.header["licence"],
+        **summarise(finished, track),
+    }
+    written: list[Path] = []
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+        with bar("drawing", 1.0, unit="") as progress:
+            written = write_outputs(output, finished, track, character, ground, film, progress)
+        target = output / "summary.json"
+        write_atomic(target, json.dumps(summary, indent=2) + "\n")
+        written.append(target)
+    if as_json:
+        click.echo(json.dumps(summary, indent=2))
+    else:
+        _print(summary, written)
+    if stopped:
+        raise click.exceptions.Exit(STOPPED)
+
+
+def _print(summary: dict[str, Any], written: list[Path]) -> None:
+    totals, laps = summary["totals"], summary["laps"]
+    table = Table(title=f"{len(laps)} × {summary['track']} on {summary['terrain']} ground")
+    columns = [
+        ("lap", "", "d"),
+        ("time s", "time_s", ".1f"),
+        ("reached", "waypoints_reached", "d"),
+        ("path m", "path_error_m", ".2f"),
+        ("heading °", "heading_error_deg", ".1f"),
+        ("speed", "mean_speed_ratio", ".2f"),
+        ("skate cm", "foot_skate_cm_per_frame", ".2f"),
+        ("ms", "ms_per_frame_mean", ".3f"),
+    ]
+    for title, _, _ in columns:
+        table.add_column(title, justify="right")
+    for number, lap in enumerate(laps, 1):
+        table.add_row(*(format(lap[key] if key else number, spec) for _, key, spec in columns))
+    Console(soft_wrap=False).print(table)
+    click.echo("path and heading: mean error; speed: share of the asked; skate and ms: per frame")
+    click.echo(f"{totals['waypoints_reached']} of {totals['waypoints']} waypoints reached")
+    for path in written:
+        click.echo(f"wrote {path}")
+    if not written:
+        click.echo("nothing written; -o DIR writes the motion, pictures and a film")
+
+
+def _may_write(path: Path, overwrite: bool) -> None:
+    if path.exists() and not overwrite:
+        raise click.ClickException(f"{path} exists; --overwrite replaces it")
+    if not path.parent.is_dir():
+        raise click.ClickException(f"{path.parent} is not a folder")

@@ -1,0 +1,1 @@
+"""Measuring what controllers and models do."""

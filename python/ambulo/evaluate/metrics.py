@@ -1,0 +1,61 @@
+"""Figures of a recording. Each function says what it prints and in which unit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ambulo.evaluate.track import Track
+from ambulo.recording import Heights, Recording
+
+Array = NDArray[np.floating]
+
+# Height above which a foot counts as off the ground (Zhang et al. 2018, MANN, section 8), metres.
+SKATE_HEIGHT = 0.025
+
+
+def foot_skate(
+    recording: Recording, terrain: Heights, joints: list[int], heights: list[float]
+) -> float:
+    """Mean foot skate in centimetres per 60 Hz frame, weighted by height as MANN does.
+
+    Per foot and frame s = v · (2 − 2^(h / H)) while h < H = 2.5 cm, else 0: v is the joint's
+    horizontal displacement per 1/60 s and h its height above the ground, less its height in
+    contact (`heights`, metres); below that h counts as 0. The mean is over frames and feet.
+    """
+    feet = recording.positions[:, joints].astype(float)
+    floor = terrain.height(feet[..., 0], feet[..., 2]) + np.asarray(heights)
+    h = np.clip(feet[..., 1] - floor, 0.0, None)[1:]
+    step = np.diff(feet[..., [0, 2]], axis=0)
+    v = np.hypot(step[..., 0], step[..., 1]) * recording.fps / 60.0
+    weight = np.clip(2.0 - 2.0 ** (h / SKATE_HEIGHT), 0.0, None)
+    return float((v * weight).mean() * 100.0)
+
+
+def path_error(root: Array, track: Track) -> float:
+    """Mean distance in metres from the root (T, 2) to the nearest point of the closed track."""
+    points = np.array([w.position for w in track.waypoints])
+    starts, ends = np.roll(points, 1, axis=0), points
+    distances = [_to_segment(root, a, b) for a, b in zip(starts, ends, strict=True)]
+    return float(np.min(distances, axis=0).mean())
+
+
+def _to_segment(points: Array, start: Array, end: Array) -> Array:
+    along = end - start
+    t = np.clip((points - start) @ along / (along @ along), 0.0, 1.0)
+    return np.linalg.norm(points - (start + t[:, None] * along), axis=1)
+
+
+def heading_error(recording: Recording) -> float:
+    """Mean angle in degrees between asked and actual facing."""
+    asked = recording.asked[:, 2]
+    difference = np.angle(np.exp(1j * (asked - recording.facing)))
+    return float(np.degrees(np.abs(difference)).mean())
+
+
+def speed_ratio(recording: Recording) -> float:
+    """Mean over frames of the root's speed over the asked speed."""
+    step = np.diff(recording.root.astype(float), axis=0)
+    speed = np.hypot(step[:, 0], step[:, 1]) * recording.fps
+    asked = np.hypot(recording.asked[1:, 0], recording.asked[1:, 1])
+    return float((speed / asked).mean())

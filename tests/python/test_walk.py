@@ -1,0 +1,341 @@
+"""Walking a track: steering, figures, outputs, and the same path at any rate."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from ambulo import Controller, Model, ModelError, Terrain, load_model
+from ambulo.cli import cli
+from ambulo.evaluate import metrics
+from ambulo.evaluate.track import Track, TrackError, Waypoint, load_track, parse_track
+from ambulo.evaluate.walk import summarise, walk_laps
+from ambulo.recording import Recording
+
+SMALL = """
+name = "small"
+reach = 0.5
+[[waypoint]]
+position = [6, 0]
+speed = 1.5
+[[waypoint]]
+position = [6, 6]
+gait = "jog"
+speed = 2.5
+[[waypoint]]
+position = [0, 0]
+gait = "crouch"
+speed = 1.0
+strafe = [1, 0]
+"""
+
+
+def recording(root: np.ndarray, **changes) -> Recording:
+    """A one-joint character on a path (T, 2)."""
+    frames = len(root)
+    positions = np.zeros((frames, 1, 3))
+    positions[:, 0, [0, 2]] = root
+    made = Recording(
+        fps=60.0, names=("Toe",), parents=(-1,), positions=positions, tips=np.zeros((frames, 0, 3)),
+        tip_joints=(), root=root, facing=np.zeros(frames), gait=np.zeros(frames, int),
+        gait_names=("walk",), leg=np.zeros(frames, int), lap=np.zeros(frames, int),
+        contacts=np.zeros((frames, 4)), asked=np.tile([0.0, 1.0, 0.0], (frames, 1)),
+    )  # fmt: skip
+    return replace(made, **changes)
+
+
+class TestTracks:
+    def test_the_seeds_track_is_table_3_1(self) -> None:
+        track = load_track("seeds")
+        positions = [(-30, 40), (-50, 0), (-25, -25), (25, -40), (10, -10), (25, 50)]
+        assert [w.position for w in track.waypoints] == positions
+        assert [w.gait for w in track.waypoints] == [
+            "walk", "walk", "jog", "jog", "crouch", "walk",
+        ]  # fmt: skip
+        # Centimetres per 60 Hz frame, in metres a second.
+        speeds = [w.speed for w in track.waypoints]
+        assert speeds == pytest.approx([1.5, 1.5, 6.3, 6.3, 1.2, 1.5])
+        assert track.waypoints[1].strafe == pytest.approx((-math.sqrt(0.5), -math.sqrt(0.5)))
+        assert track.waypoints[5].strafe == (0.0, -1.0)
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (("speed = 1.5", "speed = -1"), r"t: waypoint\[0\].speed: expected a number above 0"),
+            (("[6, 6]", "[6]"), r"waypoint\[1\].position: expected two numbers \[x, z\]"),
+            (("[6, 6]", "[6, nan]"), r"waypoint\[1\].position\[1\]: expected a number"),
+            (("[6, 6]", "[6, 0]"), r"waypoint\[1\].position: expected a place other than"),
+            (('"jog"', '"fly"'), r"waypoint\[1\].gait: expected one of walk, jog, crouch"),
+            (("[1, 0]", "[0, 0]"), r"waypoint\[2\].strafe: expected a direction"),
+            (("reach = 0.5", "reach = true"), "reach: expected a number"),
+            (("reach", "raech"), "raech: expected one of name, reach"),
+            (('name = "small"', 'speed_unit = "mph"'), "speed_unit: expected one of"),
+            (("[[waypoint]]", "[[waypoints]]"), "waypoints: expected one of"),
+            (("[[waypoint]]", "[[waypoint"), "not TOML: .*line 4"),
+        ],
+    )
+    def test_refused_with_the_place(self, change: tuple[str, str], message: str) -> None:
+        with pytest.raises(TrackError, match=message):
+            parse_track(SMALL.replace(*change), "t")
+
+    def test_a_missing_file_says_what_there_is(self) -> None:
+        with pytest.raises(TrackError, match="the shipped track is called 'seeds'"):
+            load_track("sedes")
+
+    def test_ahead_stays_on_the_leg(self) -> None:
+        track = parse_track(SMALL, "t")
+        assert track.ahead(0, (1.0, 5.0), 2.0) == pytest.approx((3.0, 0.0))
+        assert track.ahead(0, (-9.0, 0.0), 2.0) == pytest.approx((2.0, 0.0))
+        assert track.ahead(0, (5.0, 1.0), 2.0) == pytest.approx((6.0, 0.0))
+
+
+class TestMetrics:
+    def test_foot_skate_is_weighted_by_height(self) -> None:
+        # 1 cm a frame along x, on the floor: weight 2 − 2⁰ = 1.
+        root = np.stack([np.arange(11) * 0.01, np.zeros(11)], axis=1)
+        flat = Terrain.flat(0.5)
+        for height, expected in [
+            (0.0, 1.0), (-0.01, 1.0), (0.0125, 2.0 - math.sqrt(2.0)), (0.025, 0.0), (0.2, 0.0),
+        ]:  # fmt: skip
+            toe = recording(root)
+            toe.positions[:, 0, 1] = 0.5 + 0.04 + height
+            assert metrics.foot_skate(toe, flat, [0], [0.04]) == pytest.approx(expected, abs=1e-4)
+        slow = replace(recording(root), fps=30.0)
+        slow.positions[:, 0, 1] = 0.54
+        assert metrics.foot_skate(slow, flat, [0], [0.04]) == pytest.approx(0.5, abs=1e-4)
+
+    def test_path_error_is_the_distance_to_the_closed_track(self) -> None:
+        corners = [(0.0, 4.0), (4.0, 4.0), (4.0, 0.0), (0.0, 0.0)]
+        track = Track("square", 1.0, tuple(Waypoint(c, "walk", 1.0, None) for c in corners))
+        root = np.array([[2.0, 4.5], [-1.0, 2.0], [2.0, 0.0], [5.0, 5.0]])
+        expected = (0.5 + 1.0 + 0.0 + math.sqrt(2.0)) / 4.0
+        assert metrics.path_error(root, track) == pytest.approx(expected)
+
+    def test_heading_error_takes_the_shorter_way_round(self) -> None:
+        asked = np.tile([0.0, 1.0, math.radians(175)], (5, 1))
+        turned = recording(np.zeros((5, 2)), facing=np.full(5, math.radians(-175)), asked=asked)
+        assert metrics.heading_error(turned) == pytest.approx(10.0)
+
+    def test_speed_ratio(self) -> None:
+        root = np.stack([np.zeros(61), np.arange(61) * 0.75 / 60.0], axis=1)
+        assert metrics.speed_ratio(recording(root)) == pytest.approx(0.75, rel=1e-3)
+
+
+class TestTerrain:
+    def test_named(self, tmp_path: Path) -> None:
+        x = np.linspace(-3, 3, 12).reshape(3, 4)
+        assert np.array_equal(Terrain.named("flat").height(x, x), np.zeros((3, 4), np.float32))
+        hills = Terrain.named("hills", 3).height(x, 0.0 * x)
+        assert np.array_equal(hills, Terrain.hills(3).height(x, 0.0 * x)) and hills.std() > 0.0
+        grid = tmp_path / "grid.txt"
+        grid.write_text("0 0 0\n10 10 10\n20 20 20\n")
+        # Rows run along +Z, 3.937 cm apart; a unit of height is 3 cm.
+        slope = Terrain.named(str(grid)).height(np.zeros(2), np.array([0.0, 0.03937]))
+        assert slope == pytest.approx([0.3, 0.6], abs=1e-3)
+        grid.write_text("1 2\n3 x\n")
+        with pytest.raises(ValueError, match=r"grid\.txt: not a height map: row 2, column 2"):
+            Terrain.named(str(grid))
+        with pytest.raises(ValueError, match="nowhere: not a height map"):
+            Terrain.named("nowhere")
+
+    def test_real_height_map(self, data: Path) -> None:
+        path = data / "holden-pfnn" / "hmap_001_smooth.txt"
+        ground = Terrain.from_file(path)
+        heights = ground.height(*np.meshgrid(np.linspace(-5, 5, 50), np.linspace(-5, 5, 50)))
+        assert 0.1 < np.ptp(heights) < 10.0
+
+
+class TestWalking:
+    def test_a_follower_reaches_every_waypoint(self, toy: Model) -> None:
+        track = parse_track(SMALL, "t")
+        done: list[float] = []
+        laps = list(walk_laps(toy, track, Terrain.flat(), 3, on_progress=done.append))
+        assert done == sorted(done) and done[-1] <= 3.0
+        for number, lap in enumerate(laps):
+            figures, r = lap.figures, lap.recording
+            assert figures.waypoints_reached == 3 and figures.held_frames == 0
+            assert figures.time_s == pytest.approx(r.frames / 60.0)
+            assert figures.path_error_m < 0.5 and 0.5 < figures.mean_speed_ratio < 1.1
+            assert 0.0 < figures.ms_per_frame_mean < 50.0
+            assert set(r.lap) == {number} and list(np.unique(r.leg)) == [0, 1, 2]
+            ends = [r.root[r.leg == leg][-1] for leg in range(3)]
+            for end, waypoint in zip(ends, track.waypoints, strict=True):
+                assert math.dist(end, waypoint.position) < track.reach + 0.1
+        summary = summarise(laps, track)
+        assert summary["totals"]["waypoints_reached"] == summary["totals"]["waypoints"] == 9
+        times = [lap["time_s"] for lap in summary["laps"]]
+        assert summary["totals"]["time_s"] == pytest.approx(sum(times))
+
+    def test_the_same_walk_every_time(self, toy: Model) -> None:
+        track = parse_track(SMALL, "t")
+        first, second = (next(iter(walk_laps(toy, track, Terrain.hills(5), 1))) for _ in range(2))
+        assert np.array_equal(first.recording.positions, second.recording.positions)
+        assert np.array_equal(first.rotations, second.rotations)
+
+    def test_a_waypoint_out_of_reach_is_given_up(self, toy: Model) -> None:
+        # Asked to reach within a millimetre at a run, the follower passes by and circles.
+        text = SMALL.replace("reach = 0.5", "reach = 0.0001").replace("speed = 2.5", "speed = 9")
+        lap = next(iter(walk_laps(toy, parse_track(text, "t"), Terrain.flat(), 1)))
+        assert lap.figures.waypoints_reached < 3
+
+    def test_outputs(self, toy: Model, tmp_path: Path) -> None:
+        toy.save(tmp_path / "toy.safetensors")
+        (tmp_path / "t.toml").write_text(SMALL)
+        out = tmp_path / "out"
+        arguments = ["walk", str(tmp_path / "toy.safetensors"), "--track", str(tmp_path / "t.toml")]
+        quiet = CliRunner().invoke(cli, arguments)
+        assert quiet.exit_code == 0, quiet.output
+        assert "3 of 3 waypoints reached" in quiet.output and "nothing written" in quiet.output
+        run = CliRunner().invoke(cli, [*arguments, "--laps", "2", "-o", str(out), "--json"])
+        assert run.exit_code == 0, run.output
+        names = {"walk.bvh", "top.png", "strip.png", "film.gif", "summary.json"}
+        assert {p.name for p in out.iterdir()} == names
+        summary = json.loads(run.stdout)
+        assert summary == json.loads((out / "summary.json").read_text())
+        lap_keys = {
+            "time_s", "waypoints_reached", "path_error_m", "heading_error_deg", "mean_speed_ratio",
+            "foot_skate_cm_per_frame", "ms_per_frame_mean", "ms_per_frame_sd",
+        }  # fmt: skip
+        assert len(summary["laps"]) == 2 and lap_keys <= set(summary["laps"][0])
+        from ambulo import read_motion
+
+        clip, _ = read_motion(str(out / "walk.bvh"))
+        frames = round(summary["laps"][0]["time_s"] * 60)
+        assert clip.frames == frames and clip.fps == pytest.approx(60.0)
+        # The file is in centimetres; its hips go where the character went.
+        lap = next(iter(walk_laps(toy, parse_track(SMALL, "t"), Terrain.flat(), 1)))
+        expected = lap.recording.positions
+        assert np.abs(clip.positions() / 100.0 - expected).max() < 1e-4
+
+    def test_errors_are_one_line(self, toy: Model, tmp_path: Path) -> None:
+        toy.save(tmp_path / "toy.safetensors")
+        for arguments in (["--track", "nowhere"], ["--terrain", "nowhere"]):
+            run = CliRunner().invoke(cli, ["walk", str(tmp_path / "toy.safetensors"), *arguments])
+            assert run.exit_code == 1 and run.output.startswith("Error: nowhere"), run.output
+        (tmp_path / "bad.safetensors").write_bytes(b"nothing")
+        run = CliRunner().invoke(cli, ["walk", str(tmp_path / "bad.safetensors")])
+        assert run.exit_code == 1 and "not a safetensors file" in run.output
+
+    def test_ctrl_c_keeps_the_laps_that_are_done(self, toy: Model, tmp_path: Path) -> None:
+        toy.save(tmp_path / "toy.safetensors")
+        (tmp_path / "t.toml").write_text(SMALL)
+        out = tmp_path / "out"
+        arguments = [
+            str(tmp_path / "toy.safetensors"), "--track", str(tmp_path / "t.toml"),
+            "--laps", "9999", "--film", "none", "-o", str(out),
+        ]  # fmt: skip
+        process = subprocess.Popen(
+            [sys.executable, "-m", "ambulo", "walk", *arguments],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )  # fmt: skip
+        time.sleep(4.0)
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=120)
+        assert process.returncode == 130, output
+        summary = json.loads((out / "summary.json").read_text())
+        assert summary["laps_asked"] == 9999 and 1 <= len(summary["laps"]) < 9999
+        assert "Error" not in output and (out / "walk.bvh").is_file()
+
+
+class TestController:
+    def test_says_what_is_wrong(self, toy: Model) -> None:
+        with pytest.raises(ModelError, match="not finite"):
+            Controller(toy, start=(math.nan, 0.0))
+        character = Controller(toy)
+        with pytest.raises(ValueError, match="gait 'hop' is not known"):
+            character.step(0.1, gait="hop")
+        before = character.positions()
+        assert character.step(0.1, (math.nan, 0.0)).event == (
+            "held: the intent has a number that cannot be used"
+        )
+        assert character.step(-1.0).event == "held: dt is negative or not finite"
+        assert np.array_equal(character.positions(), before)
+        assert character.step(2.5).event == "skipped: 1.5 s"
+
+    def test_walls_and_areas(self, toy: Model) -> None:
+        character = Controller(toy)
+        character.core.set_areas(
+            walls=[(-5, 3, 5, 3, 0.2)], jumps=[(0, 0, 1, 0.3, 0.2)], crouches=[]
+        )
+        jumped = False
+        for _ in range(600):
+            character.step(1 / 60, (0.0, 1.5))
+            jumped |= character.core.gaits[4] > 0.9
+            assert character.root[2] < 2.81
+        assert jumped, "the jump gait is on near the area"
+        with pytest.raises(ValueError, match="finite"):
+            character.core.set_areas(walls=[(0, 0, 1, math.inf, 0.2)])
+
+
+class TestRealNetwork:
+    def test_walks_the_seeds_track(self, network: Path) -> None:
+        lap = next(iter(walk_laps(load_model(network), load_track("seeds"), Terrain.flat(), 1)))
+        figures, r = lap.figures, lap.recording
+        assert figures.waypoints_reached == 6 and figures.held_frames == 0
+        assert figures.path_error_m < 1.0 and figures.heading_error_deg < 10.0
+        hips = np.array([np.median(r.positions[r.leg == leg, 0, 1]) for leg in range(6)])
+        assert (hips[[0, 1, 2, 3, 5]] > 0.9).all() and hips[4] < 0.87, "crouches on leg 4 alone"
+        toes = r.positions[:, [r.names.index("LeftToeBase"), r.names.index("RightToeBase")], 1]
+        touching = toes[r.contacts[:, [1, 3]] > 0.5]
+        low, high = np.percentile(touching, [2, 98])
+        print(f"toe joints in contact: {low:.3f} to {high:.3f} m above the ground")
+        assert low > -0.02 and high < 0.08, "feet on the ground"
+        heads = r.positions[:, r.names.index("Head"), 1]
+        assert (heads > 0.8).all() and (heads < 1.9).all()
+
+    def test_every_rate_walks_the_same_path(self, network: Path) -> None:
+        model = load_model(network)
+        rng = np.random.default_rng(3)
+
+        def path(steps) -> tuple[np.ndarray, np.ndarray]:
+            character, time, rows = Controller(model), 0.0, []
+            while time < 12.0:
+                angle = 0.9 * math.sin(0.5 * time)
+                dt = next(steps)
+                character.step(dt, (1.4 * math.sin(angle), 1.4 * math.cos(angle)))
+                time += dt
+                rows.append((time, character.root[0], character.root[2]))
+            array = np.array(rows)
+            return array[:, 0], array[:, 1:]
+
+        def forever(dt: float):
+            while True:
+                yield dt
+
+        def irregular():
+            while True:
+                yield float(rng.uniform(0.002, 0.05))
+
+        time, reference = path(forever(1 / 60))
+        length = np.linalg.norm(np.diff(reference, axis=0), axis=1).sum()
+        assert length > 8.0
+        for name, steps in (
+            ("30", forever(1 / 30)), ("144", forever(1 / 144)), ("irregular", irregular()),
+        ):  # fmt: skip
+            at, other = path(steps)
+            inside = (at > 0.2) & (at < 11.9)
+            same = np.stack([np.interp(at, time, reference[:, i]) for i in (0, 1)], axis=1)
+            away = np.linalg.norm(other - same, axis=1)[inside].max()
+            print(f"{name}: {away / length:.2%} of the path")
+            assert away < 0.01 * length + 0.02, name
+
+    def test_hills_carry_the_feet(self, network: Path) -> None:
+        track = parse_track(SMALL.replace("[6, 6]", "[14, 14]"), "t")
+        hills = Terrain.hills(1)
+        lap = next(iter(walk_laps(load_model(network), track, hills, 1)))
+        assert lap.figures.waypoints_reached == 3
+        r = lap.recording
+        toes = r.positions[:, [r.names.index("LeftToeBase"), r.names.index("RightToeBase")]]
+        above = toes[..., 1] - hills.height(toes[..., 0], toes[..., 2])
+        touching = above[r.contacts[:, [1, 3]] > 0.5]
+        assert np.median(np.abs(touching - 0.04)) < 0.05
