@@ -338,11 +338,27 @@ class TestConvert:
         arm = place(clip, "LeftArm") - place(clip, "Hips")
         assert arm @ left * unit == pytest.approx(0.2, abs=1e-4)
 
-    def test_axes_are_never_guessed(self, run: Run, person: Path, tmp_path: Path) -> None:
-        result = run("convert", person, tmp_path / "o.bvh", "--axes", "unity")
-        assert result.exit_code == 2
-        assert "--axes needs --from-axes; person.bvh looks like cm" in result.output
-        assert not (tmp_path / "o.bvh").exists()
+    def test_a_guess_of_the_axes_is_named(self, run: Run, person: Path, tmp_path: Path) -> None:
+        said, guessed = tmp_path / "said.bvh", tmp_path / "guessed.bvh"
+        assert run("convert", person, said, "--from-axes", "cm", "--axes", "unity").exit_code == 0
+        result = run("convert", person, guessed, "--axes", "unity")
+        assert result.exit_code == 0
+        assert "note: taken for cm; --from-axes says otherwise" in result.output
+        assert guessed.read_bytes() == said.read_bytes()
+        plain = run("convert", person, tmp_path / "plain.bvh")
+        assert "taken for" not in plain.output
+
+    def test_axes_that_cannot_be_told_must_be_said(self, run: Run, tmp_path: Path) -> None:
+        chain = tmp_path / "chain.bvh"
+        chain.write_text(
+            "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Zrotation Yrotation Xrotation\n"
+            "End Site\n{\nOFFSET 1 0 0\n}\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n"
+        )
+        out = tmp_path / "o.bvh"
+        result = run("convert", chain, out, "--axes", "unity")
+        assert result.exit_code == 1 and not out.exists()
+        assert "chain.bvh: its axes and unit cannot be told; name --from-axes" in result.output
+        assert run("convert", chain, out, "--axes", "unity", "--from-axes", "cm").exit_code == 0
 
     def test_a_file_into_a_folder(self, run: Run, folder: Path, tmp_path: Path) -> None:
         (tmp_path / "out").mkdir()

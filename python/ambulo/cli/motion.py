@@ -76,8 +76,11 @@ def info(ctx: click.Context, path: Path, repair: bool, as_json: bool) -> None:
 @click.argument("target", metavar="OUT", type=click.Path(path_type=Path))
 @click.option("--fps", type=click.FloatRange(min=1e-3, max=1e6), help="Resample to this rate.")
 @click.option("--mirror", is_flag=True, help="Write the mirror image: left becomes right.")
-@click.option("--axes", type=AXES, help="Convert to these axes and units; needs --from-axes.")
-@click.option("--from-axes", type=AXES, help="What the input is in; `info` makes a guess.")
+@click.option("--axes", type=AXES, help="Convert to these axes and units.")
+@click.option(
+    "--from-axes", type=AXES,
+    help="What the input is in. Default: what `info` guesses of each file, which is then named.",
+)  # fmt: skip
 @click.option(
     "--amc-fps", default=120.0, show_default=True, type=click.FloatRange(min=1e-3, max=1e6),
     help="Rate of AMC files, which store none.",
@@ -117,8 +120,6 @@ def convert(
       ambulo motion convert captures/ mirrored/ --fps 60 --mirror --dry-run
     """  # noqa: D301 (click wants the character itself)
     outcomes = _planned(source, target)
-    if axes and not from_axes:
-        raise click.UsageError(f"--axes needs --from-axes{_suggestion(outcomes)}", ctx)
     taken = _Taken([outcome.input for outcome in outcomes], overwrite)
 
     def work(outcome: Outcome) -> None:
@@ -127,8 +128,10 @@ def convert(
         outcome.report = {"notes": report["notes"]}
         if mirror:
             clip = clip.mirrored(axes=from_axes or "ambulo")
-        if axes and from_axes:
-            clip = clip.converted(from_axes, axes)
+        if axes:
+            source_axes = from_axes or _guessed(report, outcome)
+            clip = clip.converted(source_axes, axes)
+            outcome.report |= {"from_axes": source_axes, "axes": axes}
         if fps is not None:
             clip = clip.resampled(fps)
         outcome.report |= {"frames": clip.frames, "fps": clip.fps, "joints": len(clip.names)}
@@ -202,16 +205,13 @@ def _identity(path: Path) -> tuple[int, int]:
     return status.st_dev, status.st_ino
 
 
-def _suggestion(outcomes: list[Outcome]) -> str:
-    """What the first file that can be read seems to be in."""
-    for outcome in outcomes:
-        try:
-            _, report = _core.read_motion(str(outcome.input))
-        except (ValueError, OSError):
-            continue
-        guess = report["detected"]["axes"]
-        return f"; {outcome.input.name} looks like {guess}" if guess else ""
-    return ""
+def _guessed(report: dict[str, Any], outcome: Outcome) -> str:
+    """What a file seems to be in; a note says so, since nobody did."""
+    guess = report["detected"]["axes"]
+    if not guess:
+        raise ValueError(f"{outcome.input}: its axes and unit cannot be told; name --from-axes")
+    outcome.report["notes"].append(f"taken for {guess}; --from-axes says otherwise")
+    return guess
 
 
 # -- running and telling ----------------------------------------------------------------------

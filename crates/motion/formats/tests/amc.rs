@@ -305,6 +305,9 @@ fn what_a_motion_is_refused_for() {
     refused(AMC, ":DEGREES\n", "line 2, column 1: expected at least one frame, found none");
     refused(AMC, "HIERARCHY", "line 1, column 1: expected a frame number, found 'HIERARCHY'");
     refused("2\nroot", "3\nroot", "line 8, column 1: expected frame number 2, found '3'");
+    let most = u64::MAX;
+    let message = format!("line 4, column 1: expected a frame number, found '{most}'");
+    refused("1\nroot", &format!("{most}\nroot"), &message);
     refused(
         "2\nroot",
         "2 x\nroot",

@@ -145,6 +145,15 @@ fn a_joint_gets_the_channels_that_it_needs() {
 }
 
 #[test]
+fn a_joint_that_leaves_its_offset_by_less_than_is_written_has_not_moved() {
+    use Channel::{Xposition, Yposition};
+    let options = dialect([&[Xposition, Yposition], &[], &[], &[]]);
+    assert_eq!(written(&still(), &options).1, [""; 0], "0.0000003 units");
+    let far = still().scaled(10.0);
+    assert_eq!(written(&far, &options).1, ["joint 'body' moves: it got three position channels"]);
+}
+
+#[test]
 fn a_leaf_without_an_end_gets_one() {
     let skeleton = Skeleton::new(vec![joint("a", None, 4.0, &[])]).unwrap();
     let clip = Clip::new(skeleton, 0.1, vec![], vec![], vec![DQuat::IDENTITY]).unwrap();
