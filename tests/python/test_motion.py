@@ -470,10 +470,3 @@ class TestInfo:
 
 def test_the_hosts_are_all_known() -> None:
     assert set(HOSTS) <= set(motion_axes())
-
-
-def test_help_shows_examples_a_line_each(run: Run) -> None:
-    for command in ("info", "convert"):
-        text = run(command, "--help").stdout
-        assert "\\b" not in text
-        assert f"\n    ambulo motion {command} " in text

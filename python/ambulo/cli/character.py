@@ -50,7 +50,7 @@ def import_holden_(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    r"""Import the PFNN authors' weights from FOLDER (W0_000.bin …).
+    """Import the PFNN authors' weights from FOLDER (W0_000.bin …).
 
     Any four or more of the 50 slices do; with more than four the files are checked against each
     other.
@@ -92,7 +92,7 @@ def model() -> None:
 @click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 def model_info(path: Path, as_json: bool) -> None:
-    r"""Say what MODEL is: its network, layout, licence and origin.
+    """Say what MODEL is: its network, layout, licence and origin.
 
     \b
     Example:
@@ -113,7 +113,9 @@ def model_info(path: Path, as_json: bool) -> None:
 @click.command()
 @click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
 @click.option("--track", default="seeds", show_default=True, help="'seeds' or a TOML file.")
-@click.option("--laps", default=1, show_default=True, type=click.IntRange(1, 10_000))
+@click.option(
+    "--laps", default=1, show_default=True, type=click.IntRange(1, 10_000), help="How many laps."
+)
 @click.option(
     "--terrain", default="flat", show_default=True, help="'flat', 'hills' or a height map file."
 )
@@ -140,7 +142,7 @@ def walk(
     film: str,
     as_json: bool,
 ) -> None:
-    r"""Walk MODEL's character around a track and measure it.
+    """Walk MODEL's character around a track and measure it.
 
     MODEL is a .safetensors file or a folder of the PFNN authors' weights. Motion, pictures and
     film show the first lap; the figures cover all. Ctrl-C keeps the laps that are finished.
@@ -162,7 +164,7 @@ def walk(
     type=click.Path(file_okay=False, path_type=Path), help="Folder to write.",
 )  # fmt: skip
 def demo(output: Path) -> None:
-    r"""Show the main job: a trained character walks the seeds' track.
+    """Show the main job: a trained character walks the seeds' track.
 
     Uses the PFNN authors' network from $AMBULO_DATA (default: ../shared/data).
 

@@ -56,7 +56,7 @@ def info(ctx: click.Context, path: Path, repair: bool, as_json: bool) -> None:
     Examples:
       ambulo motion info walk.bvh
       ambulo motion info captures/ --json
-    """  # noqa: D301 (click wants the character itself)
+    """
     inputs = list(_motion_files(path))
 
     def look(outcome: Outcome) -> None:
@@ -118,7 +118,7 @@ def convert(
       ambulo motion convert 02_01.amc walk.bvh
       ambulo motion convert walk.bvh unity/walk.bvh --from-axes cm --axes unity
       ambulo motion convert captures/ mirrored/ --fps 60 --mirror --dry-run
-    """  # noqa: D301 (click wants the character itself)
+    """
     outcomes = _planned(source, target)
     taken = _Taken([outcome.input for outcome in outcomes], overwrite)
 

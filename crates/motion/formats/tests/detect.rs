@@ -131,6 +131,25 @@ fn a_pose_with_hanging_arms_is_no_t_pose() {
 }
 
 #[test]
+fn one_arm_down_or_both_ahead_is_no_t_pose() {
+    let down = |side: f64| DQuat::from_rotation_z(-1.4 * side);
+    let ahead = |side: f64| DQuat::from_rotation_y(-1.4 * side);
+    let level = |_: f64| DQuat::IDENTITY;
+    let sloping = |side: f64| DQuat::from_rotation_z(-0.35 * side);
+    let posed = |left: &dyn Fn(f64) -> DQuat, right: &dyn Fn(f64) -> DQuat| {
+        let mut rotations = vec![DQuat::IDENTITY; 12];
+        (rotations[8], rotations[10]) = (left(1.0), right(-1.0));
+        let skeleton = person(MIXAMO).skeleton().clone();
+        let clip = Clip::new(skeleton, 0.01, vec![], vec![], rotations).unwrap();
+        told(&clip).t_pose_first_frame
+    };
+    assert!(posed(&level, &level));
+    assert!(!posed(&down, &level) && !posed(&level, &down));
+    assert!(!posed(&sloping, &level) && !posed(&level, &sloping));
+    assert!(!posed(&ahead, &level) && !posed(&level, &ahead) && !posed(&ahead, &ahead));
+}
+
+#[test]
 fn what_is_no_person_gets_no_unit() {
     let child = told(&person(MIXAMO).scaled(0.5));
     assert_eq!(child.metres_per_unit, None);

@@ -1,0 +1,55 @@
+"""The command line as a whole: every command's help, completion, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from ambulo.cli import cli
+
+
+def commands(group: click.Group = cli, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    for name, command in group.commands.items():
+        yield (*path, name)
+        if isinstance(command, click.Group):
+            yield from commands(command, (*path, name))
+
+
+@pytest.mark.parametrize("path", list(commands()), ids=" ".join)
+def test_help_tells_what_and_shows_how(path: tuple[str, ...]) -> None:
+    run = CliRunner().invoke(cli, [*path, "--help"])
+    assert run.exit_code == 0
+    assert "\\b" not in run.output, "click's mark for keeping lines apart is printed"
+    command: click.Command = cli
+    for name in path:
+        assert isinstance(command, click.Group)
+        command = command.commands[name]
+    if not isinstance(command, click.Group):
+        examples = [line for line in run.output.splitlines() if " ambulo " in line]
+        assert examples and all(line.startswith("    ") for line in examples)
+        assert all(option.help for option in command.params if isinstance(option, click.Option))
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion(shell: str) -> None:
+    run = CliRunner().invoke(cli, ["completion", shell])
+    assert run.exit_code == 0 and "_AMBULO_COMPLETE" in run.output
+
+
+def test_errors_are_one_line_unless_debugging(tmp_path) -> None:
+    broken = tmp_path / "broken.safetensors"
+    broken.write_bytes(b"12345678")
+    run = CliRunner().invoke(cli, ["model", "info", str(broken)])
+    assert run.exit_code == 1 and run.output.count("\n") == 1 and "broken.safetensors" in run.output
+    debugged = CliRunner().invoke(cli, ["--debug", "model", "info", str(broken)])
+    assert isinstance(debugged.exception, ValueError)
+
+
+def test_demo_without_data_says_what_is_missing(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("AMBULO_DATA", str(tmp_path))
+    run = CliRunner().invoke(cli, ["demo", "-o", str(tmp_path / "out")])
+    assert run.exit_code == 0 and "There is no trained network at" in run.output
+    assert not (tmp_path / "out").exists()
