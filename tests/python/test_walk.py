@@ -103,16 +103,30 @@ class TestMetrics:
     def test_foot_skate_is_weighted_by_height(self) -> None:
         # 1 cm a frame along x, on the floor: weight 2 − 2⁰ = 1.
         root = np.stack([np.arange(11) * 0.01, np.zeros(11)], axis=1)
-        flat = Terrain.flat(0.5)
+        flat, floor = Terrain.flat(0.5), np.array([0.04, 0.04])
         for height, expected in [
-            (0.0, 1.0), (-0.01, 1.0), (0.0125, 2.0 - math.sqrt(2.0)), (0.025, 0.0), (0.2, 0.0),
-        ]:  # fmt: skip
+            (0.0, 1.0),
+            (-0.01, 1.0),
+            (0.0125, 2.0 - math.sqrt(2.0)),
+            (0.025, 0.0),
+            (0.2, 0.0),
+        ]:
             toe = recording(root)
             toe.positions[:, 0, 1] = 0.5 + 0.04 + height
-            assert metrics.foot_skate(toe, flat, [0], [0.04]) == pytest.approx(expected, abs=1e-4)
+            skate = metrics.foot_skate(toe, flat, [0, 0], floor)
+            assert skate == pytest.approx(expected, abs=1e-4)
         slow = replace(recording(root), fps=30.0)
         slow.positions[:, 0, 1] = 0.54
-        assert metrics.foot_skate(slow, flat, [0], [0.04]) == pytest.approx(0.5, abs=1e-4)
+        assert metrics.foot_skate(slow, flat, [0, 0], floor) == pytest.approx(0.5, abs=1e-4)
+
+    def test_the_floor_is_where_feet_are_in_contact(self) -> None:
+        toe = recording(np.zeros((9, 2)))
+        toe.positions[:, 0, 1] = [0.9, 0.53, 0.54, 0.55, 0.9, 0.9, 0.9, 0.9, 0.9]
+        toe.contacts[1:4, 1] = toe.contacts[2, 3] = 1.0
+        floor = metrics.contact_floor(toe, Terrain.flat(0.5), [0, 0])
+        assert floor == pytest.approx([0.04, 0.04])
+        toe.contacts[:, 3] = 0.2
+        assert metrics.contact_floor(toe, Terrain.flat(0.5), [0, 0]) is None
 
     def test_path_error_is_the_distance_to_the_closed_track(self) -> None:
         corners = [(0.0, 4.0), (4.0, 4.0), (4.0, 0.0), (0.0, 0.0)]

@@ -14,22 +14,37 @@ Array = NDArray[np.floating]
 SKATE_HEIGHT = 0.025
 
 
-def foot_skate(
-    recording: Recording, terrain: Heights, joints: list[int], heights: list[float]
-) -> float:
+def contact_floor(recording: Recording, terrain: Heights, joints: list[int]) -> Array | None:
+    """(feet,) median height in metres of each foot's joint above the ground while in contact.
+
+    `joints` are the left and the right toe, whose contacts are the recording's. What counts as
+    zero differs by skeleton and clip by centimetres, which is as much as feet lift; so it is
+    measured. None if a foot is never in contact (above one half).
+    """
+    height = _above_ground(recording, terrain, joints)
+    touching = recording.contacts[:, [1, 3]] > 0.5
+    if not touching.any(axis=0).all():
+        return None
+    return np.array([np.median(height[touching[:, i], i]) for i in range(2)])
+
+
+def foot_skate(recording: Recording, terrain: Heights, joints: list[int], floor: Array) -> float:
     """Mean foot skate in centimetres per 60 Hz frame, weighted by height as MANN does.
 
     Per foot and frame s = v · (2 − 2^(h / H)) while h < H = 2.5 cm, else 0: v is the joint's
-    horizontal displacement per 1/60 s and h its height above the ground, less its height in
-    contact (`heights`, metres); below that h counts as 0. The mean is over frames and feet.
+    horizontal displacement per 1/60 s and h its height above the ground, less its `floor` (metres,
+    one a foot); below that h counts as 0. The mean is over frames and feet.
     """
-    feet = recording.positions[:, joints].astype(float)
-    floor = terrain.height(feet[..., 0], feet[..., 2]) + np.asarray(heights)
-    h = np.clip(feet[..., 1] - floor, 0.0, None)[1:]
-    step = np.diff(feet[..., [0, 2]], axis=0)
+    h = np.clip(_above_ground(recording, terrain, joints) - floor, 0.0, None)[1:]
+    step = np.diff(recording.positions[:, joints][..., [0, 2]].astype(float), axis=0)
     v = np.hypot(step[..., 0], step[..., 1]) * recording.fps / 60.0
     weight = np.clip(2.0 - 2.0 ** (h / SKATE_HEIGHT), 0.0, None)
     return float((v * weight).mean() * 100.0)
+
+
+def _above_ground(recording: Recording, terrain: Heights, joints: list[int]) -> Array:
+    feet = recording.positions[:, joints].astype(float)
+    return feet[..., 1] - terrain.height(feet[..., 0], feet[..., 2])
 
 
 def path_error(root: Array, track: Track) -> float:

@@ -39,6 +39,7 @@ class LapFigures:
     heading_error_deg: float
     mean_speed_ratio: float
     foot_skate_cm_per_frame: float
+    foot_floor_cm: float
     ms_per_frame_mean: float
     ms_per_frame_sd: float
     held_frames: int
@@ -172,13 +173,10 @@ class _Walker:
 
     def _figures(self, recording: Recording) -> LapFigures:
         feet = self.character.model.header["parts"]["feet"]
-        toes = [1, 3]
-        skate = metrics.foot_skate(
-            recording,
-            self.terrain,
-            [feet["joints"][i] for i in toes],
-            [feet["heights"][i] for i in toes],
-        )
+        toes = [feet["joints"][i] for i in (1, 3)]
+        floor = metrics.contact_floor(recording, self.terrain, toes)
+        if floor is None:
+            floor = np.array([feet["heights"][i] for i in (1, 3)])
         ms = np.array(self.seconds) * 1000.0
         return LapFigures(
             time_s=len(recording.root) / FPS,
@@ -186,7 +184,8 @@ class _Walker:
             path_error_m=metrics.path_error(recording.root, self.track),
             heading_error_deg=metrics.heading_error(recording),
             mean_speed_ratio=metrics.speed_ratio(recording),
-            foot_skate_cm_per_frame=skate,
+            foot_skate_cm_per_frame=metrics.foot_skate(recording, self.terrain, toes, floor),
+            foot_floor_cm=float(floor.mean() * 100.0),
             ms_per_frame_mean=float(ms.mean()),
             ms_per_frame_sd=float(ms.std()),
             held_frames=self.held,

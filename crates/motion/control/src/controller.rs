@@ -5,6 +5,7 @@ use ambulo_net::Scratch;
 use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Pose, Transform};
 
+use crate::feet::Hold;
 use crate::legs::Leg;
 use crate::trajectory::{Trajectory, yaw};
 use crate::tuning::share;
@@ -70,6 +71,8 @@ struct State {
     contacts: [f32; 4],
     /// Of the pose; the trajectory is one step ahead of it.
     root: Root,
+    /// Left and right.
+    holds: [Hold; 2],
     pose: Pose,
 }
 
@@ -81,6 +84,7 @@ impl State {
         self.velocities.clone_from(&other.velocities);
         self.contacts = other.contacts;
         self.root = other.root;
+        self.holds = other.holds;
         self.pose.local.clone_from(&other.pose.local);
     }
 
@@ -138,6 +142,7 @@ impl Controller {
             velocities: vec![Vec3::ZERO; joints],
             contacts: [1.0; 4],
             root: Root { position: Vec3::ZERO, yaw: facing },
+            holds: [Hold::default(); 2],
             pose: model.skeleton().rest_pose(),
         };
         let mut controller = Self {
@@ -157,6 +162,7 @@ impl Controller {
         controller.y.copy_from_slice(&controller.model.network().normalisation().output_mean);
         controller.model.layout().decode_output(&controller.y, &mut controller.output);
         controller.take_pose(1.0);
+        controller.show(world);
         if !controller.state.is_finite() {
             return Err(ControlError::Start);
         }
@@ -229,6 +235,7 @@ impl Controller {
             return Err(Held::Network);
         }
         self.take_pose(share(self.tuning.pose_halflife, dt));
+        self.show(world);
         let freedom = self.state.trajectory.freedom();
         let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
         self.state.phase =
@@ -270,13 +277,13 @@ impl Controller {
             self.global[joint] = Transform::new(position, rotation);
         }
         self.state.contacts = self.output.contacts.map(|c| c.clamp(0.0, 1.0));
-        self.set_local();
     }
 
     /// The shown pose: the network's rotations on the skeleton's own bones, hung from the hips,
     /// with legs bent so that the ankles are where the network has them. (Its bones vary in length
-    /// with the pose, so rotations alone would leave the feet centimetres off the ground.)
-    fn set_local(&mut self) {
+    /// with the pose, so rotations alone would leave the feet centimetres off the ground.) None of
+    /// it is fed back.
+    fn show(&mut self, world: &World<'_>) {
         let skeleton = self.model.skeleton();
         for (index, joint) in skeleton.joints().iter().enumerate() {
             let own = self.global[index];
@@ -290,11 +297,29 @@ impl Controller {
         }
         let ankles = self.model.feet().ankles().map(|foot| self.global[foot].translation);
         self.state.pose.to_global(skeleton, &mut self.global);
-        for (leg, ankle) in self.legs.into_iter().zip(ankles) {
-            if let Some(leg) = leg {
-                leg.reach(skeleton, ankle, &mut self.state.pose, &mut self.global);
-            }
+        for (side, ankle) in ankles.into_iter().enumerate() {
+            let Some(leg) = self.legs[side] else { continue };
+            let shift =
+                if self.tuning.hold_feet { self.hold(side, ankle, world) } else { Vec3::ZERO };
+            let skeleton = self.model.skeleton();
+            leg.reach(skeleton, ankle + shift, &mut self.state.pose, &mut self.global);
         }
+    }
+
+    /// How far to move an ankle so that the ball of its foot stays where it stands, above ground.
+    fn hold(&mut self, side: usize, ankle: Vec3, world: &World<'_>) -> Vec3 {
+        let feet = self.model.feet();
+        let (heel, toe) = (feet.joints[2 * side], feet.joints[2 * side + 1]);
+        let bone = self.global[toe].translation - self.global[heel].translation;
+        let ball = ankle + bone;
+        let contact = self.state.contacts[2 * side + 1];
+        let dt = self.step_time();
+        let hold = &mut self.state.holds[side];
+        let shift = hold.shift(Vec2::new(ball.x, ball.z), contact, self.tuning.foot_halflife, dt);
+        // In contact the ball is half a foot's thickness above the ground or more.
+        let floor = world.terrain.height(ball.x + shift.x, ball.z + shift.y)
+            + 0.5 * self.model.feet().heights[2 * side + 1];
+        Vec3::new(shift.x, (floor - ball.y).max(0.0), shift.y)
     }
 
     /// Copies the pose at this moment: local transforms, the root joint's in the world.

@@ -10,6 +10,7 @@
 
 mod areas;
 mod controller;
+mod feet;
 mod intent;
 mod legs;
 mod model;

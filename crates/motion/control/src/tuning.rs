@@ -17,6 +17,10 @@ pub struct Tuning {
     pub gait_halflife: f32,
     /// Of the pose fed back, around where its own velocity would take it (0.5 a frame).
     pub pose_halflife: f32,
+    /// Hold feet where they stand, and keep them above the ground, in the shown pose.
+    pub hold_feet: bool,
+    /// Of the way back after a foot is let go (0.075 a frame, linear).
+    pub foot_halflife: f32,
     /// Bends the future trajectory towards the asked velocity: share 1 − (1 − t)^bias at t of the
     /// window; without strafe, with strafe.
     pub position_bias: [f32; 2],
@@ -34,6 +38,8 @@ impl Default for Tuning {
             crouch_halflife: blend_a_frame(0.9),
             gait_halflife: blend_a_frame(0.1),
             pose_halflife: blend_a_frame(0.5),
+            hold_feet: true,
+            foot_halflife: 0.075,
             position_bias: [0.5, 1.0],
             facing_bias: [2.0, 0.5],
         }
@@ -55,6 +61,7 @@ impl Tuning {
             self.crouch_halflife,
             self.gait_halflife,
             self.pose_halflife,
+            self.foot_halflife,
         ];
         let biases = self.position_bias.iter().chain(&self.facing_bias);
         halflives.iter().all(|h| h.is_finite() && *h >= 0.0)
