@@ -13,7 +13,8 @@ faces +Z has its left at +X), quaternions as (x, y, z, w).
 
 from ambulo._core import Clip, MotionFileError, read_motion, write_motion
 from ambulo.character import Controller
-from ambulo.model import Model, ModelError, load_model
+from ambulo.loading import load_model
+from ambulo.model import Model, ModelError
 from ambulo.terrain import Terrain
 
 __all__ = [

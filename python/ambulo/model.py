@@ -89,22 +89,3 @@ class Model:
             "licence": header["licence"],
             "provenance": header["provenance"],
         }
-
-
-def load_model(path: str | Path) -> Model:
-    """Load a bundle, or import a folder of the PFNN authors' weights on the fly.
-
-    Raises:
-        ModelError: not a model; the message names the file and what is wrong.
-        FileNotFoundError: nothing is there.
-    """
-    path = Path(path)
-    if path.is_dir():
-        # Imported here: most programs load a file and need none of it.
-        from ambulo.holden import import_holden
-
-        return import_holden(path).model
-    try:
-        return Model(_core.Model.from_bytes(path.read_bytes()))
-    except ValueError as error:
-        raise ModelError(f"{path}: {error}") from error

@@ -17,7 +17,9 @@ from ambulo.evaluate.outputs import write_outputs
 from ambulo.evaluate.track import Track, load_track
 from ambulo.evaluate.walk import Lap, summarise, walk_laps
 from ambulo.files import write_atomic
-from ambulo.model import Model, load_model
+from ambulo.holden import import_holden
+from ambulo.loading import load_model
+from ambulo.model import Model
 from ambulo.terrain import Terrain
 
 STOPPED = 130
@@ -59,8 +61,6 @@ def import_holden_(
     Example:
       ambulo import holden network/ -o holden.safetensors
     """
-    from ambulo.holden import import_holden
-
     _may_write(output, overwrite)
     imported = import_holden(folder, skeleton)
     if not dry_run:

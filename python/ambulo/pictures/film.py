@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 
+from ambulo.files import replacing
 from ambulo.pictures.drawing import Array, Camera, Pixels
-from ambulo.pictures.encode import open_film, replacing
+from ambulo.pictures.encode import open_film
 from ambulo.pictures.stage import (
     ACCENT,
     INK,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ambulo.files import replacing
 from ambulo.pictures.drawing import Array
-from ambulo.pictures.encode import replacing
 from ambulo.recording import Recording
 
 if TYPE_CHECKING:
