@@ -240,6 +240,16 @@ class TestWalking:
         run = CliRunner().invoke(cli, ["walk", str(tmp_path / "bad.safetensors")])
         assert run.exit_code == 1 and "not a safetensors file" in run.output
 
+    def test_mp4_without_ffmpeg_is_refused_before_the_walk(
+        self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        toy.save(tmp_path / "toy.safetensors")
+        monkeypatch.setenv("PATH", str(tmp_path))
+        out = tmp_path / "out"
+        arguments = ["walk", str(tmp_path / "toy.safetensors"), "-o", str(out), "--film", "mp4"]
+        run = CliRunner().invoke(cli, arguments)
+        assert run.exit_code == 1 and "needs ffmpeg" in run.output and not out.exists()
+
     def test_ctrl_c_keeps_the_laps_that_are_done(self, toy: Model, tmp_path: Path) -> None:
         toy.save(tmp_path / "toy.safetensors")
         (tmp_path / "t.toml").write_text(SMALL)

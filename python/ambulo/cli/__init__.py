@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ambulo.cli.character import demo, import_, model, walk
+from ambulo.cli.character import STOPPED, demo, import_, model, walk
 from ambulo.cli.motion import motion
 
 EPILOG = """Examples:
@@ -28,6 +28,9 @@ class _Group(click.Group):
         except (click.exceptions.Exit, click.Abort):
             # Click's own ways out; they are RuntimeErrors, too.
             raise
+        except KeyboardInterrupt:
+            click.echo("stopped", err=True)
+            raise click.exceptions.Exit(STOPPED) from None
         except (ValueError, OSError, RuntimeError) as error:
             if ctx.obj and ctx.obj.get("debug"):
                 raise

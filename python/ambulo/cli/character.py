@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -203,6 +204,8 @@ def _walk(
     film: str,
     as_json: bool,
 ) -> None:
+    if output is not None and film == "mp4" and not shutil.which("ffmpeg"):
+        raise click.ClickException("--film mp4 needs ffmpeg on the PATH; --film gif does without")
     started = time.perf_counter()
     finished: list[Lap] = []
     stopped = False
@@ -227,11 +230,11 @@ def _walk(
     written: list[Path] = []
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
+        # The figures first: drawing takes longest and may be stopped.
+        written.append(output / "summary.json")
+        write_atomic(written[0], json.dumps(summary, indent=2) + "\n")
         with bar("drawing", 1.0, unit="") as progress:
-            written = write_outputs(output, finished, track, character, ground, film, progress)
-        target = output / "summary.json"
-        write_atomic(target, json.dumps(summary, indent=2) + "\n")
-        written.append(target)
+            written += write_outputs(output, finished, track, character, ground, film, progress)
     if as_json:
         click.echo(json.dumps(summary, indent=2))
     else:
