@@ -1,6 +1,13 @@
 """`python -m ambulo` is `ambulo`."""
 
-from ambulo.cli import main
+import sys
 
 if __name__ == "__main__":
-    main()
+    try:
+        # Imports take most of the start, so Ctrl-C is most likely to land in them.
+        from ambulo.cli import main
+
+        main()
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        sys.exit(130)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from ambulo import _core
 from ambulo.model import Model, ModelError
 from ambulo.terrain import Terrain
+
+Pair = Sequence[float] | NDArray[np.floating]
+"""Two numbers (x, z)."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +62,48 @@ class Controller:
     def step(
         self,
         dt: float,
-        velocity: tuple[float, float] = (0.0, 0.0),
+        velocity: Pair = (0.0, 0.0),
         *,
         gait: str = "walk",
-        facing: tuple[float, float] | None = None,
+        facing: Pair | None = None,
         strafe: float = 0.0,
     ) -> Step:
         """Move on by `dt` seconds.
 
         Args:
             dt: seconds, ≥ 0; more than one second is cut to one.
-            velocity: asked velocity (x, z), metres a second; near zero means standing.
+            velocity: asked velocity (x, z), metres a second, at most 100; near zero means standing.
             gait: `walk`, `jog` or `crouch`.
             facing: direction (x, z) to look at while strafing.
             strafe: 0 faces the movement, 1 faces `facing`.
         """
-        steps, event = self.core.step(dt, velocity, gait=gait, facing=facing, strafe=strafe)
-        return Step(steps, event)
+        look = None if facing is None else _pair(facing, "facing")
+        asked = _pair(velocity, "velocity")
+        return Step(*self.core.step(dt, asked, gait=gait, facing=look, strafe=strafe))
+
+    def set_areas(
+        self,
+        *,
+        walls: Sequence[Sequence[float]] = (),
+        jumps: Sequence[Sequence[float]] = (),
+        crouches: Sequence[Sequence[float]] = (),
+    ) -> None:
+        """Say where walls are and where to jump or duck; this replaces what was said before.
+
+        Args:
+            walls: (x1, z1, x2, z2, width): a segment and the distance to keep from it, metres.
+            jumps: (x, y, z, radius, falloff): a full jump within `radius`, none beyond falloff.
+            crouches: (x, z, half width, half depth, amount, falloff): a box parallel to the axes
+                in which to crouch by `amount` (0 to 1), fading over `falloff` metres outside.
+
+        Raises:
+            ValueError: numbers that are not finite.
+        """
+        self.core.set_areas(
+            walls=[tuple(wall) for wall in walls],
+            jumps=[tuple(jump) for jump in jumps],
+            crouches=[tuple(crouch) for crouch in crouches],
+        )
 
     def positions(self) -> NDArray[np.float32]:
         """Global joint positions, (joints, 3) metres."""
@@ -102,3 +131,9 @@ class Controller:
     def phase(self) -> float:
         """Radians, [0, 2π): 0 when the right foot comes down, π when the left does."""
         return self.core.phase
+
+
+def _pair(numbers: Pair, what: str) -> tuple[float, float]:
+    if len(numbers) != 2:
+        raise ValueError(f"{what} must be two numbers (x, z), not {len(numbers)}")
+    return (float(numbers[0]), float(numbers[1]))

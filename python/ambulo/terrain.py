@@ -13,6 +13,7 @@ from ambulo import _core
 # (Holden et al. 2017, the demo's hscale and vscale).
 MAP_CELL = 0.03937007874
 MAP_SCALE = 0.03
+MAX_SEED = 2**64 - 1
 
 
 class Terrain:
@@ -28,7 +29,13 @@ class Terrain:
 
     @classmethod
     def hills(cls, seed: int = 0, size: float = 160.0, height: float = 3.0) -> Terrain:
-        """Gentle hills, `size` metres a side around the origin, between 0 and `height` metres."""
+        """Gentle hills, `size` metres a side around the origin, between 0 and `height` metres.
+
+        Raises:
+            ValueError: the seed does not fit 64 bits, or a length is not one to make hills with.
+        """
+        if not 0 <= seed <= MAX_SEED:
+            raise ValueError(f"the seed of the hills is {seed}, expected 0 to {MAX_SEED}")
         return cls(_core.Terrain.hills(seed, size, height))
 
     @classmethod
@@ -42,7 +49,11 @@ class Terrain:
         """
         try:
             return cls(_core.Terrain.from_text(Path(path).read_text(), cell, scale))
-        except (ValueError, OSError) as error:
+        except FileNotFoundError as error:
+            raise ValueError(f"{path}: no such file") from error
+        except OSError as error:
+            raise ValueError(f"{path}: not a height map: {error.strerror or error}") from error
+        except ValueError as error:
             raise ValueError(f"{path}: not a height map: {error}") from error
 
     @classmethod
@@ -53,6 +64,8 @@ class Terrain:
                 return cls.flat()
             case "hills":
                 return cls.hills(seed)
+            case _ if not Path(name).exists():
+                raise ValueError(f"{name}: no such file; or 'flat' or 'hills'")
             case _:
                 return cls.from_file(name)
 

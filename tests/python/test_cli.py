@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Iterator
 
 import click
 import pytest
 from click.testing import CliRunner
 
-from ambulo.cli import cli
+from ambulo.cli import cli, main
 
 
 def commands(group: click.Group = cli, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -53,3 +54,20 @@ def test_demo_without_data_says_what_is_missing(tmp_path, monkeypatch) -> None:
     run = CliRunner().invoke(cli, ["demo", "-o", str(tmp_path / "out")])
     assert run.exit_code == 0 and "There is no trained network at" in run.output
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("stopped", ["cli", "main"])
+def test_ctrl_c_outside_of_a_command_is_no_traceback(
+    stopped: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stop(**_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(f"ambulo.cli.{stopped}", stop)
+    with pytest.raises(SystemExit) as caught:
+        if stopped == "cli":
+            main()
+        else:
+            runpy.run_module("ambulo", run_name="__main__")
+    assert caught.value.code == 130
+    assert capsys.readouterr().err == "stopped\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from ambulo import _core
 from ambulo._core import Clip, MotionFileError, motion_axes, read_motion, write_motion
 from ambulo.cli.motion import motion
 
@@ -383,7 +385,7 @@ class TestConvert:
         assert result.exit_code == 1
         assert tree(out) == ["a.bvh", "deep/02_01.bvh"]
         assert "1 of 3 files failed" in result.stderr
-        assert f"{folder / 'bad.bvh'}: line " in result.stderr
+        assert f"Error: {folder / 'bad.bvh'}: line " in result.stderr
         repaired = run("convert", folder, out, "--repair", "--overwrite")
         assert repaired.exit_code == 0, repaired.output
         assert "repaired: cut after frame 2" in repaired.output
@@ -421,6 +423,51 @@ class TestConvert:
         assert result.exit_code == 1
         assert (folder / "a.bvh").read_text() == PERSON
         assert person.read_text() == PERSON
+
+    def test_an_input_is_known_by_a_way_round_too(
+        self, run: Run, person: Path, tmp_path: Path
+    ) -> None:
+        # The folder `new` does not exist before it is made for the output.
+        result = run("convert", person, tmp_path / "new" / ".." / "person.bvh", "--mirror")
+        assert result.exit_code == 1 and "is an input" in result.stderr
+        assert person.read_text() == PERSON
+
+    def test_what_exists_is_named_a_few_times_only(
+        self, run: Run, folder: Path, tmp_path: Path
+    ) -> None:
+        for path in folder.rglob("*"):
+            if path.is_file():
+                path.unlink()
+        for number in range(8):
+            (folder / f"{number}.bvh").write_text(PERSON)
+        assert run("convert", folder, tmp_path / "out").exit_code == 0
+        lines = run("convert", folder, tmp_path / "out").stderr.splitlines()
+        assert [line.startswith("Error: ") for line in lines] == [True] * 5 + [False] * 2
+        assert lines[5:] == ["… and 3 more", "8 of 8 files failed"]
+        # One that fails in another way: all are named.
+        (folder / "9.bvh").write_text("nothing")
+        assert run("convert", folder, tmp_path / "out").stderr.count("Error: ") == 9
+
+    @pytest.mark.parametrize("as_json", [False, True])
+    def test_ctrl_c_tells_what_was_done(
+        self, run: Run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, as_json: bool
+    ) -> None:
+        def write(path: str, clip: Clip) -> list[str]:
+            notes = write_motion(path, clip)
+            signal.raise_signal(signal.SIGINT)
+            return notes
+
+        monkeypatch.setattr(_core, "write_motion", write)
+        out = tmp_path / "out"
+        result = run("convert", folder, out, *["--json"] * as_json)
+        assert result.exit_code == 130
+        assert result.stderr == "stopped after 1 of 3 files\n"
+        assert tree(out) == ["a.bvh"]
+        if as_json:
+            assert [entry["output"] for entry in json.loads(result.stdout)] == [str(out / "a.bvh")]
+        else:
+            assert result.stdout == f"wrote {out / 'a.bvh'} (3 frames at 60 fps)\n"
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
     def test_two_inputs_do_not_share_an_output(
         self, run: Run, folder: Path, tmp_path: Path
@@ -466,6 +513,14 @@ class TestInfo:
         result = run("info", folder, "--repair", "--json")
         assert result.exit_code == 0
         assert [entry["frames"] for entry in json.loads(result.stdout)] == [3, 2, 2]
+
+    def test_of_what_is_not_a_regular_file(self, run: Run, tmp_path: Path) -> None:
+        pipe = tmp_path / "pipe.bvh"
+        os.mkfifo(pipe)
+        for path in (pipe, Path("/dev/zero")):
+            for args in (("info", path), ("convert", path, tmp_path / "out.bvh")):
+                result = run(*args)
+                assert result.exit_code == 2 and f"{path}: not a regular file" in result.stderr
 
 
 def test_the_hosts_are_all_known() -> None:

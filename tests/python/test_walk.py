@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -16,7 +17,8 @@ import pytest
 from click.testing import CliRunner
 
 from ambulo import Controller, Model, ModelError, Terrain, load_model
-from ambulo.cli import cli
+from ambulo.character import Step
+from ambulo.cli import character, cli
 from ambulo.evaluate import metrics
 from ambulo.evaluate.track import Track, TrackError, Waypoint, load_track, parse_track
 from ambulo.evaluate.walk import summarise, walk_laps
@@ -71,15 +73,22 @@ class TestTracks:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            (("speed = 1.5", "speed = -1"), r"t: waypoint\[0\].speed: expected a number above 0"),
+            (("speed = 1.5", "speed = -1"), r"t: waypoint\[0\].speed: expected 0.06 to 20 m_per_s"),
+            (("speed = 1.5", "speed = 0.05"), r"speed: expected 0.06 to 20 m_per_s, found 0.05"),
+            (("speed = 1.5", "speed = 20.1"), r"speed: expected 0.06 to 20 m_per_s, found 20.1"),
             (("[6, 6]", "[6]"), r"waypoint\[1\].position: expected two numbers \[x, z\]"),
             (("[6, 6]", "[6, nan]"), r"waypoint\[1\].position\[1\]: expected a number"),
-            (("[6, 6]", "[6, 0]"), r"waypoint\[1\].position: expected a place other than"),
+            (("[6, 6]", "[6, 0]"), r"waypoint\[1\].position: expected a place more than reach"),
+            (
+                ("[6, 6]", "[6.3, 0.4]"),
+                r"more than reach = 0.5 m from the one before, found '0.5 m",
+            ),
             (('"jog"', '"fly"'), r"waypoint\[1\].gait: expected one of walk, jog, crouch"),
             (("[1, 0]", "[0, 0]"), r"waypoint\[2\].strafe: expected a direction"),
             (("reach = 0.5", "reach = true"), "reach: expected a number"),
             (("reach", "raech"), "raech: expected one of name, reach"),
             (('name = "small"', 'speed_unit = "mph"'), "speed_unit: expected one of"),
+            (('name = "small"', 'speed_unit = ["x"]'), "speed_unit: expected one of"),
             (("[[waypoint]]", "[[waypoints]]"), "waypoints: expected one of"),
             (("[[waypoint]]", "[[waypoint"), "not TOML: .*line 4"),
         ],
@@ -87,6 +96,15 @@ class TestTracks:
     def test_refused_with_the_place(self, change: tuple[str, str], message: str) -> None:
         with pytest.raises(TrackError, match=message):
             parse_track(SMALL.replace(*change), "t")
+
+    def test_speeds_are_limited_in_the_unit_of_the_file(self) -> None:
+        text = SMALL.replace("reach", 'speed_unit = "cm_per_frame"\nreach')
+        for good, speed in (("0.1", 0.06), ("33.3333", 20.0)):
+            track = parse_track(text.replace("speed = 1.5", f"speed = {good}"), "t")
+            assert track.waypoints[0].speed == pytest.approx(speed, abs=1e-4)
+        limits = r"0.1 to 33.3333 cm_per_frame \(0.06 to 20 m_per_s\), found 40"
+        with pytest.raises(TrackError, match=rf"^t: waypoint\[0\].speed: expected {limits}$"):
+            parse_track(text.replace("speed = 1.5", "speed = 40"), "t")
 
     def test_a_missing_file_says_what_there_is(self) -> None:
         with pytest.raises(TrackError, match="the shipped track is called 'seeds'"):
@@ -134,6 +152,7 @@ class TestMetrics:
         root = np.array([[2.0, 4.5], [-1.0, 2.0], [2.0, 0.0], [5.0, 5.0]])
         expected = (0.5 + 1.0 + 0.0 + math.sqrt(2.0)) / 4.0
         assert metrics.path_error(root, track) == pytest.approx(expected)
+        assert metrics.path_error_max(root, track) == pytest.approx(math.sqrt(2.0))
 
     def test_heading_error_takes_the_shorter_way_round(self) -> None:
         asked = np.tile([0.0, 1.0, math.radians(175)], (5, 1))
@@ -159,8 +178,18 @@ class TestTerrain:
         grid.write_text("1 2\n3 x\n")
         with pytest.raises(ValueError, match=r"grid\.txt: not a height map: row 2, column 2"):
             Terrain.named(str(grid))
-        with pytest.raises(ValueError, match="nowhere: not a height map"):
+        with pytest.raises(ValueError, match=r"^nowhere: no such file; or 'flat' or 'hills'$"):
             Terrain.named("nowhere")
+        with pytest.raises(ValueError, match=r"^nowhere: no such file$"):
+            Terrain.from_file("nowhere")
+        with pytest.raises(ValueError, match=r"not a height map: Is a directory$"):
+            Terrain.named(str(tmp_path))
+
+    def test_a_seed_has_64_bits(self) -> None:
+        Terrain.hills(2**64 - 1)
+        for seed in (-1, 2**64):
+            with pytest.raises(ValueError, match=f"the seed of the hills is {seed}, expected 0 to"):
+                Terrain.hills(seed)
 
     def test_real_height_map(self, data: Path) -> None:
         path = data / "holden-pfnn" / "hmap_001_smooth.txt"
@@ -182,6 +211,10 @@ class TestWalking:
             assert figures.path_error_m < 0.5 and 0.5 < figures.mean_speed_ratio < 1.1
             assert 0.0 < figures.ms_per_frame_mean < 50.0
             assert set(r.lap) == {number} and list(np.unique(r.leg)) == [0, 1, 2]
+            # Strafing asks for its own facing, else the movement's.
+            assert r.asked[r.leg == 2, 2] == pytest.approx(math.pi / 2)
+            along = np.arctan2(r.asked[r.leg == 0, 0], r.asked[r.leg == 0, 1])
+            assert r.asked[r.leg == 0, 2] == pytest.approx(along, abs=1e-6)
             ends = [r.root[r.leg == leg][-1] for leg in range(3)]
             for end, waypoint in zip(ends, track.waypoints, strict=True):
                 assert math.dist(end, waypoint.position) < track.reach + 0.1
@@ -189,6 +222,20 @@ class TestWalking:
         assert summary["totals"]["waypoints_reached"] == summary["totals"]["waypoints"] == 9
         times = [lap["time_s"] for lap in summary["laps"]]
         assert summary["totals"]["time_s"] == pytest.approx(sum(times))
+        furthest = [lap["path_error_max_m"] for lap in summary["laps"]]
+        assert summary["totals"]["path_error_max_m"] == max(furthest)
+        for part in (*summary["laps"], summary["totals"]):
+            assert part["path_error_max_m"] >= part["path_error_m"]
+            assert part["foot_skate_cm_per_s"] == pytest.approx(
+                60.0 * part["foot_skate_cm_per_frame"]
+            )
+
+    def test_a_lap_within_reach_of_all_has_figures(self, toy: Model) -> None:
+        places = ((0.0, 0.0), (1.1, 0.0), (0.55, 0.95))
+        track = Track("triangle", 1.0, tuple(Waypoint(p, "walk", 1.0, None) for p in places))
+        laps = list(walk_laps(toy, track, Terrain.flat(), 5))
+        assert all(lap.recording.frames >= 2 for lap in laps)
+        assert all(math.isfinite(value) for value in summarise(laps, track)["totals"].values())
 
     def test_the_same_walk_every_time(self, toy: Model) -> None:
         track = parse_track(SMALL, "t")
@@ -219,6 +266,7 @@ class TestWalking:
         lap_keys = {
             "time_s", "waypoints_reached", "path_error_m", "heading_error_deg", "mean_speed_ratio",
             "foot_skate_cm_per_frame", "ms_per_frame_mean", "ms_per_frame_sd",
+            "path_error_max_m", "foot_skate_cm_per_s",
         }  # fmt: skip
         assert len(summary["laps"]) == 2 and lap_keys <= set(summary["laps"][0])
         from ambulo import read_motion
@@ -236,9 +284,43 @@ class TestWalking:
         for arguments in (["--track", "nowhere"], ["--terrain", "nowhere"]):
             run = CliRunner().invoke(cli, ["walk", str(tmp_path / "toy.safetensors"), *arguments])
             assert run.exit_code == 1 and run.output.startswith("Error: nowhere"), run.output
+        for seed in ("-1", str(2**64)):
+            arguments = ["--terrain", "hills", "--seed", seed]
+            run = CliRunner().invoke(cli, ["walk", str(tmp_path / "toy.safetensors"), *arguments])
+            assert run.exit_code == 2 and "Invalid value for '--seed'" in run.output
         (tmp_path / "bad.safetensors").write_bytes(b"nothing")
         run = CliRunner().invoke(cli, ["walk", str(tmp_path / "bad.safetensors")])
         assert run.exit_code == 1 and "not a safetensors file" in run.output
+
+    def test_a_model_that_cannot_be_controlled_is_named(
+        self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = tmp_path / "toy.safetensors"
+        toy.save(path)
+
+        def refuse(*_: object, **__: object) -> None:
+            raise ValueError("layout 'other' is not known")
+
+        monkeypatch.setattr("ambulo.character._core.Controller", refuse)
+        run = CliRunner().invoke(cli, ["walk", str(path)])
+        assert run.exit_code == 1
+        assert run.output == f"Error: {path}: layout 'other' is not known\n"
+
+    def test_held_frames_are_said(
+        self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        toy.save(tmp_path / "toy.safetensors")
+        (tmp_path / "t.toml").write_text(SMALL)
+        arguments = ["walk", str(tmp_path / "toy.safetensors"), "--track", str(tmp_path / "t.toml")]
+        assert "held" not in CliRunner().invoke(cli, arguments).output
+        step, events = Controller.step, iter(["held: a test"] * 7)
+
+        def hold(self: Controller, *args, **options) -> Step:
+            return replace(step(self, *args, **options), event=next(events, None))
+
+        monkeypatch.setattr(Controller, "step", hold)
+        output = CliRunner().invoke(cli, arguments).output
+        assert re.search(r"^7 of \d+ frames held the pose", output, re.MULTILINE), output
 
     def test_mp4_without_ffmpeg_is_refused_before_the_walk(
         self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -269,6 +351,39 @@ class TestWalking:
         summary = json.loads((out / "summary.json").read_text())
         assert summary["laps_asked"] == 9999 and 1 <= len(summary["laps"]) < 9999
         assert "Error" not in output and (out / "walk.bvh").is_file()
+
+    def test_ctrl_c_before_the_first_lap_is_done(
+        self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def stop(*_: object, **__: object) -> None:
+            raise KeyboardInterrupt
+
+        toy.save(tmp_path / "toy.safetensors")
+        monkeypatch.setattr(Controller, "step", stop)
+        out = tmp_path / "out"
+        arguments = ["walk", str(tmp_path / "toy.safetensors"), "-o", str(out), "--json"]
+        run = CliRunner().invoke(cli, arguments)
+        assert run.exit_code == 130 and run.stdout == "" and not out.exists()
+        expected = "stopped before the first lap was finished; nothing written\n"
+        assert run.stderr == expected
+
+    def test_ctrl_c_while_drawing_keeps_the_figures(
+        self, toy: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def stop(*_: object) -> None:
+            raise KeyboardInterrupt
+
+        toy.save(tmp_path / "toy.safetensors")
+        (tmp_path / "t.toml").write_text(SMALL)
+        monkeypatch.setattr(character, "write_outputs", stop)
+        out = tmp_path / "out"
+        arguments = [
+            "walk", str(tmp_path / "toy.safetensors"), "--track", str(tmp_path / "t.toml"),
+            "-o", str(out), "--json",
+        ]  # fmt: skip
+        run = CliRunner().invoke(cli, arguments)
+        assert run.exit_code == 130 and run.stderr == "stopped\n"
+        assert json.loads(run.stdout) == json.loads((out / "summary.json").read_text())
 
 
 class TestController:

@@ -5,6 +5,9 @@ use glam::{DQuat, DVec3};
 use crate::axes::Conversion;
 use crate::{Pose, Skeleton, Transform};
 
+/// Most rotations of a resampled clip: 3.2 GB of them, a day of a person at 60 Hz.
+const MOST_ROTATIONS: f64 = 1e8;
+
 /// Why numbers are not a clip.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)]
@@ -21,6 +24,8 @@ pub enum ClipError {
     NotFinite { frame: usize, joint: usize },
     #[error("frame rate must be positive and finite, not {0}")]
     Rate(f64),
+    #[error("at {fps} frames a second it would be {frames} frames of {joints} joints: too many")]
+    TooLong { fps: f64, frames: f64, joints: usize },
 }
 
 /// A skeleton's local rotations, and the translations of those joints that have any, frame by
@@ -164,11 +169,14 @@ impl Clip {
     /// The last new frame is the last one that is not after the old end.
     ///
     /// # Errors
-    /// A rate that is not positive and finite, or so high that the result could not be held.
+    /// A rate that is not positive and finite, or one that makes more than 10⁸ rotations.
     pub fn resampled(&self, fps: f64) -> Result<Self, ClipError> {
         let count = (self.duration() * fps + 1e-6).floor() + 1.0;
-        if !(fps > 0.0 && fps.is_finite() && count * (self.skeleton.len() as f64) < 4e9) {
+        if !(fps > 0.0 && fps.is_finite()) {
             return Err(ClipError::Rate(fps));
+        }
+        if count * (self.skeleton.len() as f64) > MOST_ROTATIONS {
+            return Err(ClipError::TooLong { fps, frames: count, joints: self.skeleton.len() });
         }
         let count = count as usize;
         let mut rotations = Vec::with_capacity(count * self.skeleton.len());
@@ -327,7 +335,8 @@ mod tests {
         let back = half.resampled(120.0).unwrap();
         assert_eq!(back.frames(), clip.frames());
         assert!(clip.resampled(0.0).is_err() && clip.resampled(f64::NAN).is_err());
-        assert!(clip.resampled(1e300).is_err());
+        assert!(matches!(clip.resampled(1e300), Err(ClipError::TooLong { .. })));
+        assert!(matches!(clip.resampled(1e8), Err(ClipError::TooLong { .. })));
     }
 
     #[test]

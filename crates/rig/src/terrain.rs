@@ -43,6 +43,8 @@ pub enum HeightFieldError {
     Ragged { row: usize, expected: usize, got: usize },
     #[error("row {row}, column {column} (from 1): '{text}' is not a finite number")]
     Number { row: usize, column: usize, text: String },
+    #[error("hills are between 1 and 2048 metres a side, not {0}")]
+    Hills(f32),
     #[error("cell and scale must be finite and the cell positive")]
     Scale,
 }
@@ -116,13 +118,12 @@ impl HeightField {
     /// between 0 and `height` metres, the same on every machine.
     ///
     /// # Errors
-    /// A size that gives no grid of at least 2 and at most 4096 cells a side (of 0.5 m), or a
-    /// height that is not finite.
+    /// A size that is not between 1 and 2048 m, or a height that is not finite.
     pub fn hills(seed: u64, size: f32, height: f32) -> Result<Self, HeightFieldError> {
         let cell = 0.5;
         let side = (size / cell) as usize + 1;
-        if !(2..=4097).contains(&side) {
-            return Err(HeightFieldError::Size { rows: side, columns: side });
+        if !(1.0..=2048.0).contains(&size) {
+            return Err(HeightFieldError::Hills(size));
         }
         let mut heights = Vec::with_capacity(side * side);
         for row in 0..side {

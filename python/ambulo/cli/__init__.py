@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import click
 
-from ambulo.cli.character import STOPPED, demo, import_, model, walk
+from ambulo.cli.character import demo, import_, model, walk
 from ambulo.cli.motion import motion
+from ambulo.cli.stopping import STOPPED
 
 EPILOG = """Examples:
 
@@ -73,4 +75,9 @@ for command in (demo, import_, model, motion, walk):
 
 def main() -> None:
     """Entry point of the `ambulo` command."""
-    cli(prog_name="ambulo")
+    try:
+        cli(prog_name="ambulo")
+    except KeyboardInterrupt:
+        # Outside of a command, as while Click reports an error or the process winds down.
+        click.echo("stopped", err=True)
+        sys.exit(STOPPED)

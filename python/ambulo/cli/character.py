@@ -14,16 +14,15 @@ from rich.console import Console
 from rich.table import Table
 
 from ambulo.cli.progress import bar
+from ambulo.cli.stopping import STOPPED
 from ambulo.evaluate.outputs import write_outputs
 from ambulo.evaluate.track import Track, load_track
 from ambulo.evaluate.walk import Lap, summarise, walk_laps
 from ambulo.files import write_atomic
 from ambulo.holden import import_holden
 from ambulo.loading import load_model
-from ambulo.model import Model
-from ambulo.terrain import Terrain
-
-STOPPED = 130
+from ambulo.model import Model, ModelError
+from ambulo.terrain import MAX_SEED, Terrain
 
 
 @click.group(name="import")
@@ -120,7 +119,10 @@ def model_info(path: Path, as_json: bool) -> None:
 @click.option(
     "--terrain", default="flat", show_default=True, help="'flat', 'hills' or a height map file."
 )
-@click.option("--seed", default=0, show_default=True, help="Seed of the hills.")
+@click.option(
+    "--seed", default=0, show_default=True, type=click.IntRange(0, MAX_SEED),
+    help="Seed of the hills.",
+)  # fmt: skip
 @click.option("--responsive", is_flag=True, help="Follow wishes sooner; feet slide a little more.")
 @click.option(
     "-o", "--output", type=click.Path(file_okay=False, path_type=Path),
@@ -154,7 +156,7 @@ def walk(
       ambulo walk model.safetensors --terrain hills --seed 3 -o out/hills
     """
     _walk(
-        load_model(path), load_track(track), Terrain.named(terrain, seed), terrain, laps,
+        path, load_model(path), load_track(track), Terrain.named(terrain, seed), terrain, laps,
         responsive=responsive, output=output, film=film, as_json=as_json,
     )  # fmt: skip
 
@@ -187,12 +189,13 @@ def demo(output: Path) -> None:
     character = load_model(network)
     click.echo(f"Walking the seeds' track. {character.header['licence']}")
     _walk(
-        character, load_track("seeds"), Terrain.flat(), "flat", 1,
+        network, character, load_track("seeds"), Terrain.flat(), "flat", 1,
         responsive=False, output=output, film="gif", as_json=False,
     )  # fmt: skip
 
 
 def _walk(
+    path: Path,
     character: Model,
     track: Track,
     ground: Terrain,
@@ -218,7 +221,10 @@ def _walk(
                 finished.append(lap if not finished else lap.without_motion())
         except KeyboardInterrupt:
             stopped = True
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from error
     if not finished:
+        click.echo("stopped before the first lap was finished; nothing written", err=True)
         raise click.exceptions.Exit(STOPPED)
     summary = {
         "terrain": ground_name,
@@ -227,17 +233,19 @@ def _walk(
         "licence": character.header["licence"],
         **summarise(finished, track),
     }
+    text = json.dumps(summary, indent=2)
     written: list[Path] = []
+    # The figures first, in the file and printed: drawing takes longest and may be stopped.
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
-        # The figures first: drawing takes longest and may be stopped.
         written.append(output / "summary.json")
-        write_atomic(written[0], json.dumps(summary, indent=2) + "\n")
+        write_atomic(written[0], text + "\n")
+    if as_json:
+        click.echo(text)
+    if output is not None:
         with bar("drawing", 1.0, unit="") as progress:
             written += write_outputs(output, finished, track, character, ground, film, progress)
-    if as_json:
-        click.echo(json.dumps(summary, indent=2))
-    else:
+    if not as_json:
         _print(summary, written)
     if stopped:
         raise click.exceptions.Exit(STOPPED)
@@ -263,6 +271,11 @@ def _print(summary: dict[str, Any], written: list[Path]) -> None:
     Console(soft_wrap=False).print(table)
     click.echo("path and heading: mean error; speed: share of the asked; skate and ms: per frame")
     click.echo(f"{totals['waypoints_reached']} of {totals['waypoints']} waypoints reached")
+    if totals["held_frames"]:
+        click.echo(
+            f"{totals['held_frames']} of {totals['frames']} frames held the pose: bad input or a "
+            "bad prediction"
+        )
     for path in written:
         click.echo(f"wrote {path}")
     if not written:

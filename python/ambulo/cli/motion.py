@@ -12,8 +12,12 @@ import click
 
 from ambulo import _core
 from ambulo.cli.progress import bar
+from ambulo.cli.stopping import STOPPED, held_back
 
 SUFFIXES = {".bvh", ".amc"}
+EXISTS = "exists; --overwrite replaces it"
+# A conversion run twice by mistake fails for every file; more lines than these tell no more.
+ALIKE = 5
 AXES = click.Choice(_core.motion_axes(), case_sensitive=False)
 
 
@@ -62,13 +66,13 @@ def info(ctx: click.Context, path: Path, repair: bool, as_json: bool) -> None:
     def look(outcome: Outcome) -> None:
         _, outcome.report = _core.read_motion(str(outcome.input), repair=repair)
 
-    outcomes = _each([Outcome(file) for file in inputs], look, "reading")
+    outcomes, stopped = _each([Outcome(file) for file in inputs], look, "reading")
     if as_json:
         _print_json(outcomes, single=path.is_file())
     else:
         for outcome in outcomes:
             click.echo(_described(outcome, path))
-    _finish(ctx, outcomes)
+    _finish(ctx, outcomes, len(inputs), stopped)
 
 
 @motion.command()
@@ -110,8 +114,8 @@ def convert(
     """Convert IN, a file or a folder with all below it, to BVH at OUT.
 
     A folder's tree is kept. A file that fails does not stop the others: it is named at the end,
-    and the exit code is 1. Files appear whole or not at all. Channels and their order stay those
-    of the input.
+    and the exit code is 1. Files appear whole or not at all. Ctrl-C stops after the file at hand.
+    Channels and their order stay those of the input.
 
     \b
     Examples:
@@ -119,8 +123,8 @@ def convert(
       ambulo motion convert walk.bvh unity/walk.bvh --from-axes cm --axes unity
       ambulo motion convert captures/ mirrored/ --fps 60 --mirror --dry-run
     """
-    outcomes = _planned(source, target)
-    taken = _Taken([outcome.input for outcome in outcomes], overwrite)
+    planned = _planned(source, target)
+    taken = _Taken([outcome.input for outcome in planned], overwrite)
 
     def work(outcome: Outcome) -> None:
         output = taken.check(outcome.output)
@@ -139,14 +143,14 @@ def convert(
             output.parent.mkdir(parents=True, exist_ok=True)
             outcome.report["notes"] += _core.write_motion(str(output), clip)
 
-    _each(outcomes, work, "converting")
+    outcomes, stopped = _each(planned, work, "converting")
     if as_json:
         _print_json(outcomes, single=source.is_file())
     else:
         for outcome in outcomes:
             if outcome.error is None:
                 _say(outcome, "would write" if dry_run else "wrote")
-    _finish(ctx, outcomes)
+    _finish(ctx, outcomes, len(planned), stopped)
 
 
 # -- files ------------------------------------------------------------------------------------
@@ -157,10 +161,17 @@ def _motion_files(path: Path) -> Iterator[Path]:
     if path.is_file():
         yield path
         return
+    _refuse_special(path)
     files = [p for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file()]
     if not files:
         raise click.UsageError(f"no .bvh or .amc file below {path}")
     yield from sorted(files)
+
+
+def _refuse_special(path: Path) -> None:
+    """Pipes and devices may never end, so they are not read."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise click.UsageError(f"{path}: not a regular file")
 
 
 def _planned(source: Path, target: Path) -> list[Outcome]:
@@ -170,6 +181,7 @@ def _planned(source: Path, target: Path) -> list[Outcome]:
             raise click.UsageError(f"{source} is a folder, but {target} is a file")
         files = _motion_files(source)
         return [Outcome(f, (target / f.relative_to(source)).with_suffix(".bvh")) for f in files]
+    _refuse_special(source)
     if target.is_dir():
         target = target / f"{source.stem}.bvh"
     if target.suffix.lower() != ".bvh":
@@ -186,17 +198,21 @@ class _Taken:
         self.overwrite = overwrite
 
     def check(self, output: Path | None) -> Path:
-        """Give the output back if it may be written."""
+        """Give the output's real path if it may be written.
+
+        Resolved first: `new/../a.bvh` does not exist before `new` does, and is `a.bvh` after.
+        """
         assert output is not None
-        if output.exists():
-            if _identity(output) in self.inputs:
+        real = output.resolve()
+        if real.exists():
+            if _identity(real) in self.inputs:
                 raise ValueError(f"{output} is an input: it is not written over")
-            if output.resolve() not in self.outputs and not self.overwrite:
-                raise ValueError(f"{output} exists; --overwrite replaces it")
-        if output.resolve() in self.outputs:
+            if real not in self.outputs and not self.overwrite:
+                raise ValueError(f"{output} {EXISTS}")
+        if real in self.outputs:
             raise ValueError(f"{output} is the output of another input too")
-        self.outputs.add(output.resolve())
-        return output
+        self.outputs.add(real)
+        return real
 
 
 def _identity(path: Path) -> tuple[int, int]:
@@ -217,16 +233,23 @@ def _guessed(report: dict[str, Any], outcome: Outcome) -> str:
 # -- running and telling ----------------------------------------------------------------------
 
 
-def _each(outcomes: list[Outcome], work: Callable[[Outcome], None], title: str) -> list[Outcome]:
-    """Do the work for every file; what fails is kept as that file's error."""
-    with bar(title, len(outcomes), "files") as progress:
+def _each(
+    outcomes: list[Outcome], work: Callable[[Outcome], None], title: str
+) -> tuple[list[Outcome], bool]:
+    """Do the work for every file; what fails is kept as that file's error.
+
+    Gives the outcomes of the files that were come to, at least one, and whether Ctrl-C was pressed.
+    """
+    with held_back() as stop, bar(title, len(outcomes), "files") as progress:
         for done, outcome in enumerate(outcomes):
             progress(done)
             try:
                 work(outcome)
             except (ValueError, OSError) as error:
                 outcome.error = str(error)
-    return outcomes
+            if stop():
+                return outcomes[: done + 1], True
+    return outcomes, False
 
 
 def _print_json(outcomes: list[Outcome], single: bool) -> None:
@@ -267,14 +290,20 @@ def _described(outcome: Outcome, path: Path) -> str:
     return "\n".join(lines)
 
 
-def _finish(ctx: click.Context, outcomes: list[Outcome]) -> None:
-    """Name what failed; exit code 1 if anything did."""
-    failed = [outcome for outcome in outcomes if outcome.error is not None]
-    for outcome in failed:
-        error = outcome.error or ""
-        where = "" if str(outcome.input) in error else f"{outcome.input}: "
-        click.echo(f"{where}{error}", err=True)
+def _finish(ctx: click.Context, outcomes: list[Outcome], total: int, stopped: bool) -> None:
+    """Name what failed; exit code 1 if anything did, 130 after Ctrl-C."""
+    failed = [(outcome.input, outcome.error) for outcome in outcomes if outcome.error is not None]
+    alike = len(failed) == len(outcomes) and all(error.endswith(EXISTS) for _, error in failed)
+    shown = failed[:ALIKE] if alike else failed
+    for path, error in shown:
+        where = "" if str(path) in error else f"{path}: "
+        click.echo(f"Error: {where}{error}", err=True)
+    if len(shown) < len(failed):
+        click.echo(f"… and {len(failed) - len(shown)} more", err=True)
+    if failed and total > 1:
+        click.echo(f"{len(failed)} of {len(outcomes)} files failed", err=True)
+    if stopped:
+        click.echo(f"stopped after {len(outcomes)} of {total} files", err=True)
+        ctx.exit(STOPPED)
     if failed:
-        if len(outcomes) > 1:
-            click.echo(f"{len(failed)} of {len(outcomes)} files failed", err=True)
         ctx.exit(1)

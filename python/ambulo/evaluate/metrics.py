@@ -49,10 +49,19 @@ def _above_ground(recording: Recording, terrain: Heights, joints: list[int]) -> 
 
 def path_error(root: Array, track: Track) -> float:
     """Mean distance in metres from the root (T, 2) to the nearest point of the closed track."""
+    return float(_from_track(root, track).mean())
+
+
+def path_error_max(root: Array, track: Track) -> float:
+    """Largest distance in metres from the root (T, 2) to the nearest point of the closed track."""
+    return float(_from_track(root, track).max())
+
+
+def _from_track(root: Array, track: Track) -> Array:
     points = np.array([w.position for w in track.waypoints])
     starts, ends = np.roll(points, 1, axis=0), points
     distances = [_to_segment(root, a, b) for a, b in zip(starts, ends, strict=True)]
-    return float(np.min(distances, axis=0).mean())
+    return np.min(distances, axis=0)
 
 
 def _to_segment(points: Array, start: Array, end: Array) -> Array:

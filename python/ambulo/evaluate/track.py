@@ -12,6 +12,8 @@ from typing import Any, NoReturn
 GAITS = ("walk", "jog", "crouch")
 # A published speed of 1 means a centimetre per 60 Hz frame.
 UNITS = {"m_per_s": 1.0, "cm_per_frame": 0.6}
+# Metres a second: below the first a character stands, and above the second nobody runs.
+SLOWEST, FASTEST = 0.06, 20.0
 
 
 class TrackError(ValueError):
@@ -95,21 +97,25 @@ def parse_track(text: str, source: str) -> Track:
     reader = _Reader(source)
     reader.only(table, "", {"name", "speed_unit", "reach", "waypoint"})
     unit = table.get("speed_unit", "m_per_s")
-    if unit not in UNITS:
+    if not isinstance(unit, str) or unit not in UNITS:
         reader.fail("speed_unit", f"one of {', '.join(UNITS)}", unit)
     listed = table.get("waypoint")
     if not isinstance(listed, list) or len(listed) < 2:
         reader.fail("waypoint", "two or more [[waypoint]] tables", listed)
     waypoints = tuple(
-        reader.waypoint(entry, f"waypoint[{i}]", UNITS[unit]) for i, entry in enumerate(listed)
+        reader.waypoint(entry, f"waypoint[{i}]", unit) for i, entry in enumerate(listed)
     )
+    reach = reader.positive(table.get("reach", 1.0), "reach")
     for i, waypoint in enumerate(waypoints):
-        if waypoint.position == waypoints[i - 1].position:
-            reader.fail(f"waypoint[{i}].position", "a place other than the one before", "the same")
+        apart = math.dist(waypoint.position, waypoints[i - 1].position)
+        if apart <= reach:
+            # It would count as reached without a step.
+            expected = f"a place more than reach = {reach:g} m from the one before"
+            reader.fail(f"waypoint[{i}].position", expected, f"{apart:g} m")
     name = table.get("name", Path(source).stem)
     if not isinstance(name, str):
         reader.fail("name", "text", name)
-    return Track(name, reader.positive(table.get("reach", 1.0), "reach"), waypoints)
+    return Track(name, reach, waypoints)
 
 
 class _Reader:
@@ -139,12 +145,22 @@ class _Reader:
             self.fail(path, "a number above 0", value)
         return number
 
+    def speed(self, value: Any, path: str, unit: str) -> float:
+        """Metres a second from a number in `unit`."""
+        low, high = SLOWEST / UNITS[unit], FASTEST / UNITS[unit]
+        number = self.number(value, path)
+        # A limit that is written in the file's unit may miss it by a rounding.
+        if not low - 1e-9 <= number <= high + 1e-9:
+            metres = "" if unit == "m_per_s" else f" ({SLOWEST:g} to {FASTEST:g} m_per_s)"
+            self.fail(path, f"{low:g} to {high:g} {unit}{metres}", value)
+        return number * UNITS[unit]
+
     def pair(self, value: Any, path: str) -> tuple[float, float]:
         if not isinstance(value, list) or len(value) != 2:
             self.fail(path, "two numbers [x, z]", value)
         return (self.number(value[0], f"{path}[0]"), self.number(value[1], f"{path}[1]"))
 
-    def waypoint(self, table: Any, path: str, unit: float) -> Waypoint:
+    def waypoint(self, table: Any, path: str, unit: str) -> Waypoint:
         self.only(table, path, {"position", "gait", "speed", "strafe"})
         gait = table.get("gait", "walk")
         if gait not in GAITS:
@@ -159,6 +175,6 @@ class _Reader:
         return Waypoint(
             position=self.pair(table.get("position"), f"{path}.position"),
             gait=gait,
-            speed=self.positive(table.get("speed"), f"{path}.speed") * unit,
+            speed=self.speed(table.get("speed"), f"{path}.speed", unit),
             strafe=strafe,
         )

@@ -27,6 +27,8 @@ FPS = 60
 LOOKAHEAD = 2.0
 # A leg that takes longer than this many times its straight-line time, and ten seconds, is given up.
 PATIENCE = 3.0
+# Figures of speed need two frames; a lap has them even if it starts within reach of every waypoint.
+LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,11 @@ class LapFigures:
     time_s: float
     waypoints_reached: int
     path_error_m: float
+    path_error_max_m: float
     heading_error_deg: float
     mean_speed_ratio: float
     foot_skate_cm_per_frame: float
+    foot_skate_cm_per_s: float
     foot_floor_cm: float
     ms_per_frame_mean: float
     ms_per_frame_sd: float
@@ -123,12 +127,12 @@ class _Walker:
         for frame in range(math.ceil(patience * FPS)):
             x, _, z, _ = self.character.root
             distance = math.dist((x, z), waypoint.position)
-            if distance <= self.track.reach:
+            if distance <= self.track.reach and len(self.rows) >= LEAST_FRAMES:
                 self.reached += 1
                 return
             goal = self.track.ahead(leg, (x, z), LOOKAHEAD)
             dx, dz = goal[0] - x, goal[1] - z
-            speed = waypoint.speed / math.hypot(dx, dz)
+            speed = waypoint.speed / max(math.hypot(dx, dz), 1e-6)
             self._frame(leg, waypoint, (dx * speed, dz * speed))
             if self.on_progress and frame % FPS == 0:
                 share = max(0.0, 1.0 - distance / self.track.leg_length(leg))
@@ -177,14 +181,17 @@ class _Walker:
         floor = metrics.contact_floor(recording, self.terrain, toes)
         if floor is None:
             floor = np.array([feet["heights"][i] for i in (1, 3)])
+        skate = metrics.foot_skate(recording, self.terrain, toes, floor)
         ms = np.array(self.seconds) * 1000.0
         return LapFigures(
             time_s=len(recording.root) / FPS,
             waypoints_reached=self.reached,
             path_error_m=metrics.path_error(recording.root, self.track),
+            path_error_max_m=metrics.path_error_max(recording.root, self.track),
             heading_error_deg=metrics.heading_error(recording),
             mean_speed_ratio=metrics.speed_ratio(recording),
-            foot_skate_cm_per_frame=metrics.foot_skate(recording, self.terrain, toes, floor),
+            foot_skate_cm_per_frame=skate,
+            foot_skate_cm_per_s=FPS * skate,
             foot_floor_cm=float(floor.mean() * 100.0),
             ms_per_frame_mean=float(ms.mean()),
             ms_per_frame_sd=float(ms.std()),
@@ -200,6 +207,7 @@ def summarise(laps: list[Lap], track: Track) -> dict:
     # Frame-weighted means; the spread of the frame time is that of the laps' means, as published.
     totals = {key: float(np.average([f[key] for f in figures], weights=frames)) for key in keys}
     totals["ms_per_frame_sd_of_laps"] = float(np.std([f["ms_per_frame_mean"] for f in figures]))
+    totals["path_error_max_m"] = max(f["path_error_max_m"] for f in figures)
     return {
         "track": track.name,
         "waypoints": len(track.waypoints),

@@ -74,8 +74,8 @@ def write_top_view(
     axes = figure.add_axes((corner[0], corner[1], extent[0], extent[1]))
     _draw_track(axes, points, radii)
     _draw_path(axes, recording)
-    _draw_facing(axes, recording)
-    _finish(figure, axes, recording, low, high, title)
+    period = _draw_facing(axes, recording, float((high - low).max()))
+    _finish(figure, axes, recording, low, high, title, period)
     with replacing(path) as part:
         figure.savefig(part, format=path.suffix[1:].lower(), facecolor="white")
     return path
@@ -130,23 +130,38 @@ def _draw_path(axes: Axes, recording: Recording) -> None:
     axes.plot(*root[0], "o", ms=7, mfc="white", mec=INK, mew=1.6, zorder=7)
 
 
-def _draw_facing(axes: Axes, recording: Recording) -> None:
-    """A tick for every second of the first lap, the way the character faces."""
+def _draw_facing(axes: Axes, recording: Recording, size: float) -> int:
+    """Ticks along the first lap, the way the character faces; returns the seconds between them.
+
+    A tick is a fortieth of the picture's `size` (metres) long and they keep as far apart, so that
+    facing shows on a small course and on a large one.
+    """
     from matplotlib.collections import LineCollection
 
+    length = max(size / 40.0, 0.4)
+    root = np.asarray(recording.root, np.float64)
     first = np.flatnonzero(np.asarray(recording.lap) == recording.lap[0])
-    seconds = np.arange(0.0, len(first), recording.fps).astype(np.int64)
-    at = np.asarray(recording.root, np.float64)[first[seconds]]
-    yaw = np.asarray(recording.facing, np.float64)[first[seconds]]
-    tick = np.stack([np.sin(yaw), np.cos(yaw)], -1)
+    walked = float(np.hypot(*np.diff(root[first], axis=0).T).sum())
+    speed = walked / max(len(first) / recording.fps, 1e-6)
+    period = max(round(length / max(speed, 0.1)), 1)
+    at = root[first][:: max(round(period * recording.fps), 1)]
+    yaw = np.asarray(recording.facing, np.float64)[first][:: max(round(period * recording.fps), 1)]
+    tick = length * np.stack([np.sin(yaw), np.cos(yaw)], -1)
     axes.add_collection(
-        LineCollection(list(np.stack([at, at + 0.40 * tick], 1)), colors=INK, lw=1.1, zorder=5)
+        LineCollection(list(np.stack([at, at + tick], 1)), colors=INK, lw=1.1, zorder=5)
     )
     axes.plot(at[:, 0], at[:, 1], "o", ms=3.0, color=INK, zorder=5)
+    return period
 
 
 def _finish(
-    figure: Figure, axes: Axes, recording: Recording, low: Array, high: Array, title: str
+    figure: Figure,
+    axes: Axes,
+    recording: Recording,
+    low: Array,
+    high: Array,
+    title: str,
+    period: int,
 ) -> None:
     """Axes, legend and title."""
     from matplotlib.lines import Line2D
@@ -170,7 +185,8 @@ def _finish(
         Line2D([], [], color=GAITS[g % len(GAITS)], lw=2.6, label=recording.gait_names[g])
         for g in present
     ]
-    handles.append(Line2D([], [], color=INK, lw=1.1, marker="o", ms=3, label="facing, each second"))
+    every = "facing, each second" if period == 1 else f"facing, every {period} s"
+    handles.append(Line2D([], [], color=INK, lw=1.1, marker="o", ms=3, label=every))
     handles.append(Line2D([], [], color="#c9ccd1", lw=1.0, ls=(0, (5, 4)), label="straight track"))
     handles.append(
         Line2D([], [], ls="", marker="o", ms=7, mfc="white", mec=INK, mew=1.6, label="start")

@@ -1,5 +1,7 @@
 //! One character: fixed steps inside, interpolated poses outside.
 
+use std::f32::consts::{PI, TAU};
+
 use ambulo_features::{Input, Output};
 use ambulo_net::Scratch;
 use ambulo_rig::glam::{Vec2, Vec3};
@@ -34,7 +36,7 @@ pub enum Held {
 /// Something that the caller may want to know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// Nothing moved: the last good pose is held.
+    /// The pose is held as it was, but for fixed steps that ran before in the same call.
     Held(Held),
     /// `dt` was longer than a second; this much of it was left out, seconds.
     Skipped(f32),
@@ -71,6 +73,8 @@ struct State {
     contacts: [f32; 4],
     /// Of the pose; the trajectory is one step ahead of it.
     root: Root,
+    /// That the pose was predicted with; `phase` is one step ahead of it.
+    pose_phase: f32,
     /// Left and right.
     holds: [Hold; 2],
     pose: Pose,
@@ -84,6 +88,7 @@ impl State {
         self.velocities.clone_from(&other.velocities);
         self.contacts = other.contacts;
         self.root = other.root;
+        self.pose_phase = other.pose_phase;
         self.holds = other.holds;
         self.pose.local.clone_from(&other.pose.local);
     }
@@ -104,8 +109,10 @@ pub struct Controller {
     model: Model,
     tuning: Tuning,
     state: State,
-    /// The state one fixed step ago: to interpolate from, and to fall back to.
+    /// The state one fixed step ago: to interpolate from.
     previous: State,
+    /// Where a fixed step is tried out; it becomes the state only if it is good.
+    next: State,
     /// Seconds since the last fixed step, in [0, step).
     since: f64,
     input: Input,
@@ -142,12 +149,14 @@ impl Controller {
             velocities: vec![Vec3::ZERO; joints],
             contacts: [1.0; 4],
             root: Root { position: Vec3::ZERO, yaw: facing },
+            pose_phase: 0.0,
             holds: [Hold::default(); 2],
             pose: model.skeleton().rest_pose(),
         };
         let mut controller = Self {
             tuning,
             previous: state.clone(),
+            next: state.clone(),
             state,
             since: 0.0,
             input: Input::zero(joints),
@@ -163,10 +172,13 @@ impl Controller {
         controller.model.layout().decode_output(&controller.y, &mut controller.output);
         controller.take_pose(1.0);
         controller.show(world);
-        if !controller.state.is_finite() {
+        // The mean pose is nobody's stance: no foot is held in it.
+        controller.next.holds = [Hold::default(); 2];
+        if !controller.next.is_finite() {
             return Err(ControlError::Start);
         }
-        controller.previous.copy_from(&controller.state);
+        controller.state.copy_from(&controller.next);
+        controller.previous.copy_from(&controller.next);
         Ok(controller)
     }
 
@@ -188,11 +200,11 @@ impl Controller {
         if !intent.is_valid() {
             return held(Held::Intent);
         }
-        let skipped = (dt - LONGEST).max(0.0);
+        let skipped = dt - dt.min(LONGEST);
         let mut event = (skipped > 0.0).then_some(Event::Skipped(skipped));
         let step = 1.0 / f64::from(self.model.layout().fps());
         let before = self.since;
-        self.since += f64::from(dt - skipped);
+        self.since += f64::from(dt.min(LONGEST));
         let mut steps = 0;
         // A caller at the very same rate adds up to one step each time but for rounding.
         while self.since > step * (1.0 - 1e-4) {
@@ -208,19 +220,16 @@ impl Controller {
     }
 
     fn fixed_step(&mut self, intent: &Intent, world: &World<'_>) -> Result<(), Held> {
-        std::mem::swap(&mut self.state, &mut self.previous);
-        self.state.copy_from(&self.previous);
-        let result = self.predict(intent, world);
-        if result.is_err() {
-            // Both become the last good state: the pose stands still.
-            self.state.copy_from(&self.previous);
-        }
-        result
+        self.next.copy_from(&self.state);
+        self.predict(intent, world)?;
+        std::mem::swap(&mut self.previous, &mut self.state);
+        std::mem::swap(&mut self.state, &mut self.next);
+        Ok(())
     }
 
     fn predict(&mut self, intent: &Intent, world: &World<'_>) -> Result<(), Held> {
         let dt = self.step_time();
-        self.state.trajectory.follow(intent, &self.tuning, world, dt);
+        self.next.trajectory.follow(intent, &self.tuning, world, dt);
         self.tell(world);
         let layout = self.model.layout();
         layout.encode_input(&self.input, &mut self.x);
@@ -228,7 +237,7 @@ impl Controller {
             return Err(Held::Terrain);
         }
         let network = self.model.network();
-        network.predict(&self.x, self.state.phase, &mut self.y, &mut self.scratch);
+        network.predict(&self.x, self.next.phase, &mut self.y, &mut self.scratch);
         layout.decode_output(&self.y, &mut self.output);
         let body = self.output.joint_position.iter().all(|p| p.abs().max_element() < REACH);
         if !body || !self.y.iter().all(|number| number.is_finite()) {
@@ -236,25 +245,24 @@ impl Controller {
         }
         self.take_pose(share(self.tuning.pose_halflife, dt));
         self.show(world);
-        let freedom = self.state.trajectory.freedom();
+        let freedom = self.next.trajectory.freedom();
         let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
-        self.state.phase =
-            (self.state.phase + std::f32::consts::TAU * cycles).rem_euclid(std::f32::consts::TAU);
-        self.state.trajectory.advance(&self.output, world.areas, dt);
-        if self.state.is_finite() { Ok(()) } else { Err(Held::Network) }
+        self.next.phase = (self.next.phase + TAU * cycles).rem_euclid(TAU);
+        self.next.trajectory.advance(&self.output, world.areas, dt);
+        if self.next.is_finite() { Ok(()) } else { Err(Held::Network) }
     }
 
-    /// Fills the network's input from the state.
+    /// Fills the network's input from the state that is tried out.
     fn tell(&mut self, world: &World<'_>) {
-        let trajectory = &self.state.trajectory;
+        let trajectory = &self.next.trajectory;
         trajectory.sample(world, &mut self.input.trajectory, &mut self.input.ground);
         let before = trajectory.before();
         let root = Vec3::new(before.position.x, before.height, before.position.z);
         let inward = before.rotation().inverse();
-        for (told, position) in self.input.joint_position.iter_mut().zip(&self.state.positions) {
+        for (told, position) in self.input.joint_position.iter_mut().zip(&self.next.positions) {
             *told = inward * (*position - root);
         }
-        for (told, velocity) in self.input.joint_velocity.iter_mut().zip(&self.state.velocities) {
+        for (told, velocity) in self.input.joint_velocity.iter_mut().zip(&self.next.velocities) {
             *told = inward * *velocity;
         }
     }
@@ -263,20 +271,21 @@ impl Controller {
     /// where its own velocity would have taken it; what is shown is the prediction itself.
     fn take_pose(&mut self, share: f32) {
         let dt = self.step_time();
-        let now = *self.state.trajectory.now();
+        let now = *self.next.trajectory.now();
         let root = Vec3::new(now.position.x, now.height, now.position.z);
         let outward = now.rotation();
-        self.state.root = Root { position: root, yaw: yaw(now.direction) };
+        self.next.root = Root { position: root, yaw: yaw(now.direction) };
         for joint in 0..self.global.len() {
             let position = outward * self.output.joint_position[joint] + root;
             let velocity = outward * self.output.joint_velocity[joint];
             let rotation = outward * self.output.joint_rotation[joint];
-            let carried = self.state.positions[joint] + velocity * dt;
-            self.state.positions[joint] = carried.lerp(position, share);
-            self.state.velocities[joint] = velocity;
+            let carried = self.next.positions[joint] + velocity * dt;
+            self.next.positions[joint] = carried.lerp(position, share);
+            self.next.velocities[joint] = velocity;
             self.global[joint] = Transform::new(position, rotation);
         }
-        self.state.contacts = self.output.contacts.map(|c| c.clamp(0.0, 1.0));
+        self.next.contacts = self.output.contacts.map(|c| c.clamp(0.0, 1.0));
+        self.next.pose_phase = self.next.phase;
     }
 
     /// The shown pose: the network's rotations on the skeleton's own bones, hung from the hips,
@@ -287,7 +296,7 @@ impl Controller {
         let skeleton = self.model.skeleton();
         for (index, joint) in skeleton.joints().iter().enumerate() {
             let own = self.global[index];
-            self.state.pose.local[index] = match joint.parent {
+            self.next.pose.local[index] = match joint.parent {
                 Some(parent) => Transform::new(
                     joint.offset.as_vec3(),
                     (self.global[parent].rotation.inverse() * own.rotation).normalize(),
@@ -296,13 +305,13 @@ impl Controller {
             };
         }
         let ankles = self.model.feet().ankles().map(|foot| self.global[foot].translation);
-        self.state.pose.to_global(skeleton, &mut self.global);
+        self.next.pose.to_global(skeleton, &mut self.global);
         for (side, ankle) in ankles.into_iter().enumerate() {
             let Some(leg) = self.legs[side] else { continue };
             let shift =
                 if self.tuning.hold_feet { self.hold(side, ankle, world) } else { Vec3::ZERO };
             let skeleton = self.model.skeleton();
-            leg.reach(skeleton, ankle + shift, &mut self.state.pose, &mut self.global);
+            leg.reach(skeleton, ankle + shift, &mut self.next.pose, &mut self.global);
         }
     }
 
@@ -312,9 +321,9 @@ impl Controller {
         let (heel, toe) = (feet.joints[2 * side], feet.joints[2 * side + 1]);
         let bone = self.global[toe].translation - self.global[heel].translation;
         let ball = ankle + bone;
-        let contact = self.state.contacts[2 * side + 1];
+        let contact = self.next.contacts[2 * side + 1];
         let dt = self.step_time();
-        let hold = &mut self.state.holds[side];
+        let hold = &mut self.next.holds[side];
         let shift = hold.shift(Vec2::new(ball.x, ball.z), contact, self.tuning.foot_halflife, dt);
         // In contact the ball is half a foot's thickness above the ground or more.
         let floor = world.terrain.height(ball.x + shift.x, ball.z + shift.y)
@@ -331,19 +340,22 @@ impl Controller {
     pub fn root(&self) -> Root {
         let (a, b) = (self.previous.root, self.state.root);
         let t = self.share();
-        let turn = (b.yaw - a.yaw + std::f32::consts::PI).rem_euclid(std::f32::consts::TAU)
-            - std::f32::consts::PI;
-        Root { position: a.position.lerp(b.position, t), yaw: a.yaw + turn * t }
+        let yaw = a.yaw + wrapped(b.yaw - a.yaw) * t;
+        Root { position: a.position.lerp(b.position, t), yaw }
     }
 
-    /// Left heel, left toe, right heel, right toe: how surely each is on the ground, 0 to 1.
+    /// Left heel, left toe, right heel, right toe: how surely each is on the ground at this moment,
+    /// 0 to 1.
     pub fn contacts(&self) -> [f32; 4] {
-        self.state.contacts
+        let (a, b, t) = (self.previous.contacts, self.state.contacts, self.share());
+        std::array::from_fn(|foot| a[foot] + (b[foot] - a[foot]) * t)
     }
 
-    /// Radians, [0, 2π): 0 when the right foot comes down, π when the left does.
+    /// Of the pose at this moment, radians, [0, 2π): 0 when the right foot comes down, π when the
+    /// left does.
     pub fn phase(&self) -> f32 {
-        self.state.phase
+        let (a, b) = (self.previous.pose_phase, self.state.pose_phase);
+        (a + wrapped(b - a) * self.share()).rem_euclid(TAU)
     }
 
     /// The window around the newest fixed step, for drawing.
@@ -360,4 +372,9 @@ impl Controller {
     fn share(&self) -> f32 {
         (self.since * f64::from(self.model.layout().fps())).clamp(0.0, 1.0) as f32
     }
+}
+
+/// The same angle in [−π, π).
+fn wrapped(angle: f32) -> f32 {
+    (angle + PI).rem_euclid(TAU) - PI
 }

@@ -13,7 +13,10 @@ const HOLD: f32 = 0.6;
 /// … and let go below this one; in between it stays as it is.
 const LET_GO: f32 = 0.4;
 /// A foot that the body has left this far behind is let go, metres.
-const LEASH: f32 = 0.25;
+const LEASH: f32 = 0.1;
+/// Half-life in seconds by which a held foot creeps to where the network has it: nothing within a
+/// step, but whoever stands ends in the network's stance.
+const CREEP: f32 = 1.0;
 
 /// Whether one foot is held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,6 +46,7 @@ impl Hold {
             // Taking hold where the foot is shown, not where the network has it, leaves no jump.
             Grip::Free if contact >= HOLD => Grip::Held(ball + self.shift),
             Grip::Held(place) if place.distance(ball) >= LEASH => Grip::Lost,
+            Grip::Held(place) => Grip::Held(place.lerp(ball, share(CREEP, dt))),
             grip => grip,
         };
         if let Grip::Held(place) = self.grip {
@@ -61,22 +65,33 @@ mod tests {
     #[test]
     fn a_foot_in_contact_stays_and_comes_back_smoothly() {
         let mut hold = Hold::default();
-        let ball = |frame: usize| Vec2::new(0.0, 0.002 * frame as f32);
+        let ball = |frame: usize| Vec2::new(0.0, 0.001 * frame as f32);
         assert_eq!(hold.shift(ball(0), 0.5, 0.05, DT), Vec2::ZERO, "not sure enough yet");
         let start = ball(1);
         for frame in 1..40 {
             // Contact that wavers around one half does not flicker once a foot is held.
             let contact = if frame % 2 == 0 { 0.45 } else { 0.9 };
             let shown = ball(frame) + hold.shift(ball(frame), contact, 0.05, DT);
-            assert!(shown.abs_diff_eq(start, 1e-6), "slid to {shown} in frame {frame}");
+            let slid = shown.distance(start);
+            assert!(slid < 0.01, "slid {slid} of {} m in frame {frame}", ball(frame).y);
         }
-        let mut before = start;
+        let mut before = ball(39) + hold.shift(ball(39), 0.9, 0.05, DT);
         for frame in 40..100 {
             let shown = ball(frame) + hold.shift(ball(frame), 0.0, 0.05, DT);
             assert!(shown.distance(before) < 0.02, "jumped");
             before = shown;
         }
         assert!(before.distance(ball(99)) < 1e-4, "back where the network has it");
+    }
+
+    #[test]
+    fn who_stands_ends_in_the_networks_stance() {
+        let mut hold = Hold::default();
+        hold.shift(Vec2::ZERO, 1.0, 0.05, DT);
+        let stance = Vec2::new(0.08, 0.0);
+        let early = (0..6).map(|_| hold.shift(stance, 1.0, 0.05, DT)).last().unwrap();
+        let late = (0..600).map(|_| hold.shift(stance, 1.0, 0.05, DT)).last().unwrap();
+        assert!(early.length() > 0.07 && late.length() < 1e-3, "{early} {late}");
     }
 
     #[test]
@@ -89,7 +104,7 @@ mod tests {
             largest = largest.max(shift.length());
             assert!(frame < 60 || shift.length() < 1e-3, "not held again while in contact");
         }
-        assert!(largest > 0.9 * LEASH && largest < LEASH, "{largest}");
+        assert!(largest > 0.8 * LEASH && largest < LEASH, "{largest}");
         hold.shift(Vec2::ZERO, 0.1, 0.05, DT);
         hold.shift(Vec2::ZERO, 0.9, 0.05, DT);
         let again = hold.shift(Vec2::new(0.01, 0.0), 0.9, 0.05, DT);

@@ -15,10 +15,13 @@ pub enum Gait {
     Crouch,
 }
 
+/// Metres a second; more is a mistake of the caller's.
+const FASTEST: f32 = 100.0;
+
 /// Wishes for this moment; the world's frame, ground plane (x, z).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Intent {
-    /// Asked velocity, metres a second. Below 6 cm/s it means standing.
+    /// Asked velocity, metres a second, at most 100. Below 6 cm/s it means standing.
     pub velocity: Vec2,
     /// Where to look while strafing, any length but zero; `None`: along the movement.
     pub facing: Option<Vec2>,
@@ -32,6 +35,6 @@ impl Intent {
     /// Whether every number can be used.
     pub fn is_valid(&self) -> bool {
         let facing = self.facing.is_none_or(|f| f.is_finite() && f.length_squared() > 1e-12);
-        self.velocity.is_finite() && facing && (0.0..=1.0).contains(&self.strafe)
+        self.velocity.length() <= FASTEST && facing && (0.0..=1.0).contains(&self.strafe)
     }
 }

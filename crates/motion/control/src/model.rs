@@ -1,11 +1,15 @@
 //! A bundle that a controller can use: its layout and skeleton are checked once.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use ambulo_features::{Layout, LayoutError};
 use ambulo_net::{Bundle, Network};
 use ambulo_rig::Skeleton;
 use serde::{Deserialize, Serialize};
+
+/// Metres; more is a skeleton in another unit.
+const LONGEST_BONE: f64 = 10.0;
 
 /// Why a bundle cannot control a character.
 #[derive(Debug, thiserror::Error)]
@@ -74,11 +78,18 @@ impl Model {
         if header.fps != f64::from(layout.fps()) {
             return Err(ControlError::Rate { expected: layout.fps(), found: header.fps });
         }
-        let fits = feet.joints.iter().all(|&joint| joint < skeleton.len())
-            && feet.heights.iter().all(|h| h.is_finite());
-        if !fits {
-            let reason = "a joint that the skeleton does not have, or a height that is not finite";
-            return Err(ControlError::Broken { part: "feet", reason: reason.into() });
+        let broken = |part, reason: &str| Err(ControlError::Broken { part, reason: reason.into() });
+        let joints = skeleton.joints();
+        if joints.iter().any(|joint| joint.offset.length() > LONGEST_BONE) {
+            return broken("skeleton", "a bone is longer than 10 m");
+        }
+        let [a, b, c, d] = feet.joints;
+        if feet.joints.iter().any(|&joint| joint >= joints.len()) || a == c || b == d {
+            return broken("feet", "a joint that the skeleton does not have, or one foot for both");
+        }
+        if feet.heights.iter().any(|height| height.abs().partial_cmp(&1.0) != Some(Ordering::Less))
+        {
+            return broken("feet", "a height of a metre or more");
         }
         Ok(Self { layout, skeleton: Arc::new(skeleton), feet, bundle: bundle.clone() })
     }

@@ -318,6 +318,63 @@ mod tests {
     }
 
     #[test]
+    fn each_gait_has_its_input() {
+        let areas = Areas::default();
+        let world = World { terrain: &Flat(0.0), areas: &areas };
+        for (gait, speed, expected) in [
+            (Gait::Walk, 1.0, WALK),
+            (Gait::Jog, 1.0, JOG),
+            (Gait::Crouch, 1.0, CROUCH),
+            (Gait::Jog, 0.0, STAND),
+        ] {
+            let mut trajectory = standing(&areas);
+            let intent = Intent { velocity: Vec2::new(0.0, speed), gait, ..Intent::default() };
+            for _ in 0..90 {
+                trajectory.follow(&intent, &Tuning::default(), &world, DT);
+            }
+            for (index, share) in trajectory.now().gait.into_iter().enumerate() {
+                let wanted = if index == expected { 1.0 } else { 0.0 };
+                assert!((share - wanted).abs() < 1e-3, "{gait:?}: input {index} is {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn crouch_areas_crouch() {
+        let low = crate::CrouchArea {
+            centre: Vec2::new(1.0, 3.0),
+            half_size: Vec2::splat(0.2),
+            amount: 1.0,
+            falloff: 0.3,
+        };
+        let areas = Areas { crouches: vec![low], ..Areas::default() };
+        let world = World { terrain: &Flat(0.5), areas: &areas };
+        let mut trajectory = standing(&areas);
+        let intent = Intent { velocity: Vec2::new(0.0, 1.5), ..Intent::default() };
+        for _ in 0..90 {
+            trajectory.follow(&intent, &Tuning::default(), &world, DT);
+        }
+        let inside = trajectory.points().iter().find(|p| (p.ground().y - 3.0).abs() < 0.1).unwrap();
+        assert!(inside.gait[CROUCH] > 0.99 && inside.gait[WALK] < 0.01, "{:?}", inside.gait);
+        assert!(trajectory.now().gait[CROUCH] < 0.01);
+    }
+
+    #[test]
+    fn strafing_bends_the_path_sooner() {
+        let areas = Areas::default();
+        let world = World { terrain: &Flat(0.0), areas: &areas };
+        let reach = |strafe: f32| {
+            let mut trajectory = standing(&areas);
+            let facing = Some(Vec2::Y);
+            let velocity = Vec2::new(0.0, 1.5);
+            let intent = Intent { velocity, facing, strafe, ..Intent::default() };
+            (0..3).for_each(|_| trajectory.follow(&intent, &Tuning::default(), &world, DT));
+            trajectory.points()[WINDOW_POINTS - 1].ground().y
+        };
+        assert!(reach(1.0) > reach(0.0) + 0.05, "{} {}", reach(1.0), reach(0.0));
+    }
+
+    #[test]
     fn advancing_shifts_the_past_and_follows_the_network() {
         let areas = Areas::default();
         let world = World { terrain: &Flat(0.0), areas: &areas };
