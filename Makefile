@@ -28,7 +28,7 @@ endif
 # a removed file counts too.
 NATIVE_SOURCES := Cargo.toml $(wildcard Cargo.lock) pyproject.toml $(shell find crates bindings \
 	-type d -o -name '*.rs' -o -name Cargo.toml)
-PYTHON_CODE := python tests/python $(wildcard benches) docs/pictures tools/check-rooms
+PYTHON_CODE := python tests/python $(wildcard benches) docs/pictures fuzz/make_seeds.py tools/check-rooms
 LOCKS := $(wildcard requirements/*.txt Cargo.lock fuzz/Cargo.lock)
 CARGO_SOURCE := source = "registry+https://github.com/rust-lang/crates.io-index"
 

@@ -22,6 +22,8 @@ from ambulo import _core
 from ambulo.model import Model, ModelError
 
 SLICES = 50
+# As many as a layout takes.
+MOST_JOINTS = 1000
 LICENCE = (
     "Academic and non-commercial use only: weights by Daniel Holden, Taku Komura and Jun Saito "
     '("Phase-Functioned Neural Networks for Character Control", SIGGRAPH 2017)'
@@ -69,7 +71,7 @@ def import_holden(folder: str | Path, skeleton: str | Path | None = None) -> Imp
     Args:
         folder: with the network's files.
         skeleton: a BVH file with the rest pose; without it `rest.bvh` is looked for beside the
-            files and in the folder above, and else the network's mean pose gives the bones.
+            files and in the folder above, and else the network's own poses give the bones.
 
     Raises:
         ModelError: a file is missing, has the wrong size or a number that is not finite, or the
@@ -106,7 +108,7 @@ def import_holden(folder: str | Path, skeleton: str | Path | None = None) -> Imp
         if bones is None:
             names, parents = zip(*JOINTS, strict=True)
             draft = build(_described(names, parents, np.zeros((joints, 3))))
-            bones = _described(names, parents, _predicted_offsets(draft, parents))
+            bones = _described(names, parents, _core.drawn_offsets(draft).astype(float))
         core = build(bones)
     except ValueError as error:
         raise ModelError(f"{folder}: {error}") from error
@@ -161,8 +163,9 @@ def _stack(folder: Path, name: str, slices: list[int], count: int | None) -> Arr
 
 
 def _joints(folder: Path, inputs: int, outputs: int) -> int:
-    joints, rest = divmod(inputs - 156, 6)
-    if rest or joints < 1 or outputs != 32 + 9 * joints:
+    one, two = (_widths(joints)[0] for joints in (1, 2))
+    joints = max(1 + (inputs - one) // (two - one), 1)
+    if joints > MOST_JOINTS or _widths(joints) != (inputs, outputs):
         raise ModelError(
             f"{folder}: Xmean.bin has {inputs} numbers and Ymean.bin {outputs}, expected "
             "156 + 6·J and 32 + 9·J for J joints (342 and 311 for 31)"
@@ -170,28 +173,15 @@ def _joints(folder: Path, inputs: int, outputs: int) -> int:
     return joints
 
 
-def blend(phases: Array) -> Array:
-    """(N,) cycles to (N, 4) shares of the control points, closed Catmull-Rom, float64."""
-    at = 4.0 * np.mod(phases, 1.0)
-    k = np.floor(at).astype(int)
-    m = at - k
-    shares = np.stack(
-        [
-            -0.5 * m + m**2 - 0.5 * m**3,
-            1.0 - 2.5 * m**2 + 1.5 * m**3,
-            0.5 * m + 2.0 * m**2 - 1.5 * m**3,
-            -0.5 * m**2 + 0.5 * m**3,
-        ]
-    )
-    result = np.zeros((len(at), 4))
-    for neighbour in range(4):
-        np.add.at(result, (np.arange(len(at)), (k + neighbour - 1) % 4), shares[neighbour])
-    return result
+def _widths(joints: int) -> tuple[int, int]:
+    """Lengths of the layout's two vectors."""
+    layout = _core.layout("holden", joints)
+    return sum(n for _, n in layout["inputs"]), sum(n for _, n in layout["outputs"])
 
 
 def _solver(folder: Path, slices: list[int]):
     """The least-squares solution, as a function of an array's slices."""
-    matrix = blend(np.array(slices) / SLICES)
+    matrix = _core.phase_shares([i / SLICES for i in slices])
     inverse = np.linalg.pinv(matrix)
     amplification = float(np.abs(inverse).sum(axis=1).max())
     # Float32 rounding of 6e-8, grown by this, must stay well below what is visible.
@@ -245,36 +235,6 @@ def _described(names: Any, parents: Any, offsets: Array) -> list[dict[str, Any]]
         {"name": name, "parent": None if parent < 0 else int(parent), "offset": offset.tolist()}
         for name, parent, offset in zip(names, parents, offsets, strict=True)
     ]
-
-
-def _predicted_offsets(core: _core.Model, parents: tuple[int, ...]) -> Array:
-    """Bones in metres as the network draws them: the mean over a cycle of its poses.
-
-    Not from its mean output: positions and rotations averaged over a whole data set give bones
-    that are several percent too short.
-    """
-    joints, phases = len(parents), np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-    x = np.tile(core.normalisation()["input_mean"], (len(phases), 1))
-    y = core.predict(x, phases.astype(np.float32)).astype(float)
-    positions = y[:, 32 : 32 + 3 * joints].reshape(-1, joints, 3) / 100.0
-    logs = y[:, 32 + 6 * joints :].reshape(-1, joints, 3)
-    offsets = np.zeros((joints, 3))
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            bones = positions[:, joint] - positions[:, parent]
-            turned = [_rotate(-2.0 * log, b) for log, b in zip(logs[:, parent], bones, strict=True)]
-            offsets[joint] = np.mean(turned, axis=0)
-    return offsets
-
-
-def _rotate(axis_angle: Array, vector: Array) -> Array:
-    """Rodrigues' formula."""
-    angle = float(np.linalg.norm(axis_angle))
-    if angle < 1e-12:
-        return vector
-    axis = axis_angle / angle
-    across = np.cross(axis, vector)
-    return vector + np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)
 
 
 def _header(

@@ -265,3 +265,11 @@ impl Controller {
         self.pose.to_global(self.controller.model().skeleton(), &mut self.global);
     }
 }
+
+/// (J, 3) offsets in metres as a model's network draws its bones; see the crate.
+#[pyfunction]
+pub fn drawn_offsets<'py>(py: Python<'py>, model: &Model) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let model = control::Model::new(model.bundle.clone()).map_err(value_error)?;
+    let offsets = py.detach(|| model.drawn_offsets());
+    Ok(rows(offsets.into_iter().map(|offset| offset.to_array())).into_pyarray(py))
+}

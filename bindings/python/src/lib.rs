@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _core {
     #[pymodule_export]
-    use crate::character::{Controller, Terrain};
+    use crate::character::{Controller, Terrain, drawn_offsets};
     #[pymodule_export]
     use crate::errors::MotionFileError;
     #[pymodule_export]
-    use crate::model::{Model, layout};
+    use crate::model::{Model, layout, phase_shares};
     #[pymodule_export]
     use crate::motion::{Clip, motion_axes, read_motion, write_motion};
 }

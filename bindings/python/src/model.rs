@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ambulo_features::{Block, Layout};
-use ambulo_net::{Bundle, CONTROL_POINTS, Layer, Network, Normalisation};
+use ambulo_net::{Bundle, CONTROL_POINTS, Layer, Network, Normalisation, spline_shares};
 use numpy::ndarray::Array2;
 use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -184,4 +184,12 @@ pub fn layout<'py>(py: Python<'py>, name: &str, joints: usize) -> PyResult<Bound
     dict.set_item("inputs", table(layout.inputs()))?;
     dict.set_item("outputs", table(layout.outputs()))?;
     Ok(dict)
+}
+
+/// Phases in cycles to (N, 4) shares of the control points.
+#[pyfunction]
+pub fn phase_shares<'py>(py: Python<'py>, cycles: Vec<f64>) -> Bound<'py, PyArray2<f64>> {
+    let shares = cycles.iter().flat_map(|&phase| spline_shares(phase)).collect();
+    let shares = Array2::from_shape_vec((cycles.len(), CONTROL_POINTS), shares);
+    shares.expect("four shares a phase").into_pyarray(py)
 }

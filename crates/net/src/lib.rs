@@ -15,4 +15,4 @@ mod phase;
 
 pub use bundle::{Bundle, BundleError, FORMAT_VERSION, Header, LayoutTable};
 pub use network::{Layer, Network, NetworkError, Normalisation, Scratch};
-pub use phase::{CONTROL_POINTS, control_weights};
+pub use phase::{CONTROL_POINTS, control_weights, spline_shares};

@@ -5,27 +5,33 @@ use std::f64::consts::TAU;
 /// Control points of the closed spline.
 pub const CONTROL_POINTS: usize = 4;
 
-/// Shares of the four control points at a phase in radians; they sum to 1.
-///
-/// A closed Catmull-Rom cubic (paper, equation 7): with p = 4·phase/2π, k = ⌊p⌋ and μ = p − k, the
-/// neighbours are k−1, k, k+1, k+2 (mod 4). Control point i lies at phase 2π·i/4. Any finite phase
-/// is taken modulo 2π.
+/// Shares of the four control points at a phase in radians; they sum to 1. Any finite phase is
+/// taken modulo 2π.
 pub fn control_weights(phase: f32) -> [f32; CONTROL_POINTS] {
-    let at = f64::from(phase).rem_euclid(TAU) / TAU * CONTROL_POINTS as f64;
+    spline_shares(f64::from(phase).rem_euclid(TAU) / TAU).map(|share| share as f32)
+}
+
+/// The same at a phase in cycles, in f64: what solving for control points needs.
+///
+/// A closed Catmull-Rom cubic (paper, equation 7): with p = 4·phase, k = ⌊p⌋ and μ = p − k, the
+/// neighbours are k−1, k, k+1, k+2 (mod 4). Control point i lies at phase i/4. Any finite phase is
+/// taken modulo 1.
+pub fn spline_shares(cycles: f64) -> [f64; CONTROL_POINTS] {
+    let at = cycles.rem_euclid(1.0) * CONTROL_POINTS as f64;
     let k = (at as usize) % CONTROL_POINTS;
     let m = at - at.floor();
     let (m2, m3) = (m * m, m * m * m);
-    let shares = [
+    let neighbours = [
         -0.5 * m + m2 - 0.5 * m3,
         1.0 - 2.5 * m2 + 1.5 * m3,
         0.5 * m + 2.0 * m2 - 1.5 * m3,
         -0.5 * m2 + 0.5 * m3,
     ];
-    let mut weights = [0.0; CONTROL_POINTS];
-    for (neighbour, share) in shares.into_iter().enumerate() {
-        weights[(k + neighbour + CONTROL_POINTS - 1) % CONTROL_POINTS] = share as f32;
+    let mut shares = [0.0; CONTROL_POINTS];
+    for (neighbour, share) in neighbours.into_iter().enumerate() {
+        shares[(k + neighbour + CONTROL_POINTS - 1) % CONTROL_POINTS] = share;
     }
-    weights
+    shares
 }
 
 #[cfg(test)]

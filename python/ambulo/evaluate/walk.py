@@ -203,7 +203,8 @@ def summarise(laps: list[Lap], track: Track) -> dict:
     """The laps' figures and their totals, as plain values for `summary.json`."""
     figures = [asdict(lap.figures) for lap in laps]
     frames = np.array([lap.recording.frames for lap in laps], dtype=float)
-    keys = [k for k in figures[0] if k not in ("waypoints_reached", "held_frames", "time_s")]
+    others = ("waypoints_reached", "held_frames", "time_s", "path_error_max_m")
+    keys = [k for k in figures[0] if k not in others]
     # Frame-weighted means; the spread of the frame time is that of the laps' means, as published.
     totals = {key: float(np.average([f[key] for f in figures], weights=frames)) for key in keys}
     totals["ms_per_frame_sd_of_laps"] = float(np.std([f["ms_per_frame_mean"] for f in figures]))

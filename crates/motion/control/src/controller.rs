@@ -257,8 +257,7 @@ impl Controller {
         let trajectory = &self.next.trajectory;
         trajectory.sample(world, &mut self.input.trajectory, &mut self.input.ground);
         let before = trajectory.before();
-        let root = Vec3::new(before.position.x, before.height, before.position.z);
-        let inward = before.rotation().inverse();
+        let (root, inward) = (before.root(), before.rotation().inverse());
         for (told, position) in self.input.joint_position.iter_mut().zip(&self.next.positions) {
             *told = inward * (*position - root);
         }
@@ -272,8 +271,7 @@ impl Controller {
     fn take_pose(&mut self, share: f32) {
         let dt = self.step_time();
         let now = *self.next.trajectory.now();
-        let root = Vec3::new(now.position.x, now.height, now.position.z);
-        let outward = now.rotation();
+        let (root, outward) = (now.root(), now.rotation());
         self.next.root = Root { position: root, yaw: yaw(now.direction) };
         for joint in 0..self.global.len() {
             let position = outward * self.output.joint_position[joint] + root;
@@ -327,7 +325,7 @@ impl Controller {
         let shift = hold.shift(Vec2::new(ball.x, ball.z), contact, self.tuning.foot_halflife, dt);
         // In contact the ball is half a foot's thickness above the ground or more.
         let floor = world.terrain.height(ball.x + shift.x, ball.z + shift.y)
-            + 0.5 * self.model.feet().heights[2 * side + 1];
+            + 0.5 * feet.heights[2 * side + 1];
         Vec3::new(shift.x, (floor - ball.y).max(0.0), shift.y)
     }
 

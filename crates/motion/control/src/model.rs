@@ -3,9 +3,10 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use ambulo_features::{Layout, LayoutError};
+use ambulo_features::{Layout, LayoutError, Output};
 use ambulo_net::{Bundle, Network};
-use ambulo_rig::Skeleton;
+use ambulo_rig::glam::Vec3;
+use ambulo_rig::{Pose, Skeleton, Transform};
 use serde::{Deserialize, Serialize};
 
 /// Metres; more is a skeleton in another unit.
@@ -112,6 +113,31 @@ impl Model {
     /// In metres and Ambulo's axes.
     pub fn skeleton(&self) -> &Skeleton {
         &self.skeleton
+    }
+
+    /// Each joint's offset in metres as the network itself draws it: the mean over a cycle of its
+    /// poses at its mean input, by the skeleton's parents.
+    ///
+    /// Not from its mean output: positions and rotations averaged over a whole data set give bones
+    /// that are several percent too short.
+    pub fn drawn_offsets(&self) -> Vec<Vec3> {
+        const POSES: usize = 64;
+        let (network, joints) = (self.network(), self.skeleton.len());
+        let (mut y, mut scratch) = (vec![0.0; network.outputs()], network.scratch());
+        let mut output = Output::zero(joints);
+        let mut offsets = vec![Vec3::ZERO; joints];
+        for pose in 0..POSES {
+            let phase = std::f32::consts::TAU * pose as f32 / POSES as f32;
+            network.predict(&network.normalisation().input_mean, phase, &mut y, &mut scratch);
+            self.layout.decode_output(&y, &mut output);
+            let drawn = output.joint_position.iter().zip(&output.joint_rotation);
+            let global: Vec<_> = drawn.map(|(&p, &r)| Transform::new(p, r)).collect();
+            let local = Pose::from_global(&self.skeleton, &global).local;
+            for (offset, transform) in offsets.iter_mut().zip(local) {
+                *offset += transform.translation / POSES as f32;
+            }
+        }
+        offsets
     }
 
     /// Heels and toes.

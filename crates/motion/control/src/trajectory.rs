@@ -47,6 +47,11 @@ impl TrajectoryPoint {
         Vec2::new(self.position.x, self.position.z)
     }
 
+    /// Where a root here stands: the place, at the window's mean height.
+    pub fn root(&self) -> Vec3 {
+        Vec3::new(self.position.x, self.height, self.position.z)
+    }
+
     /// From the frame of a root here to the world.
     pub fn rotation(&self) -> Quat {
         Quat::from_rotation_y(yaw(self.direction))

@@ -58,6 +58,16 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// Past space and comments (`#` to the line's end); false at the end of the file.
+    pub fn skip_comments(&mut self) -> bool {
+        self.skip_space();
+        while self.peek() == Some(b'#') {
+            self.skip_line();
+            self.skip_space();
+        }
+        self.peek().is_some()
+    }
+
     /// The next word: a brace, or what stands before the next space or brace. Empty at the end.
     pub fn word(&mut self) -> &'a [u8] {
         self.skip_space();

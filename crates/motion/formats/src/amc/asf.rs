@@ -113,23 +113,13 @@ impl Asf {
 }
 
 impl<'a> Reader<'a> {
-    /// Past space and comments; false at the end.
-    fn more(&mut self) -> bool {
-        self.cursor.skip_space();
-        while self.cursor.peek() == Some(b'#') {
-            self.cursor.skip_line();
-            self.cursor.skip_space();
-        }
-        self.cursor.peek().is_some()
-    }
-
     /// Whether a line of this section follows.
     fn in_section(&mut self) -> bool {
-        self.more() && self.cursor.peek() != Some(b':')
+        self.cursor.skip_comments() && self.cursor.peek() != Some(b':')
     }
 
     fn section(&mut self) -> Result<bool, ReadError> {
-        if !self.more() {
+        if !self.cursor.skip_comments() {
             return Ok(false);
         }
         if self.cursor.accept(":units") {

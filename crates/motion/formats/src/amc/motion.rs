@@ -65,19 +65,9 @@ pub(super) fn read(skeleton: &Asf, bytes: &[u8], options: &ReadOptions) -> Resul
 }
 
 impl<'b> Reader<'_, 'b> {
-    /// Past space and comments; false at the end.
-    fn more(&mut self) -> bool {
-        self.cursor.skip_space();
-        while self.cursor.peek() == Some(b'#') {
-            self.cursor.skip_line();
-            self.cursor.skip_space();
-        }
-        self.cursor.peek().is_some()
-    }
-
     /// Lines with a colon, before the first frame.
     fn header(&mut self) -> Result<(), ReadError> {
-        while self.more() && self.cursor.peek() == Some(b':') {
+        while self.cursor.skip_comments() && self.cursor.peek() == Some(b':') {
             if self.cursor.accept(":DEGREES") {
                 self.radians = false;
             } else if self.cursor.accept(":RADIANS") {
@@ -110,7 +100,7 @@ impl<'b> Reader<'_, 'b> {
         let most = most_frames(self.cursor.bytes.len(), joints, 1);
         let (mut rotations, mut translations) = (vec![], vec![]);
         let (mut count, mut number) = (0, None);
-        while self.more() {
+        while self.cursor.skip_comments() {
             if count == most {
                 let expected = format!("at most {most} frames in so small a file");
                 return Err(self.cursor.error(&expected, "more"));
@@ -166,7 +156,9 @@ impl<'b> Reader<'_, 'b> {
     /// The bones of a frame, up to the next frame's number.
     fn frame(&mut self, frame: usize) -> Result<(), ReadError> {
         let mut lines = 0;
-        while self.more() && !self.cursor.peek().is_some_and(|byte| byte.is_ascii_digit()) {
+        while self.cursor.skip_comments()
+            && !self.cursor.peek().is_some_and(|byte| byte.is_ascii_digit())
+        {
             let bone = self.bone(lines)?;
             if self.seen[bone] == frame {
                 return Err(self.cursor.unexpected("each bone once a frame"));
