@@ -409,7 +409,7 @@ class TestController:
         jumped = False
         for _ in range(600):
             character.step(1 / 60, (0.0, 1.5))
-            jumped |= character.core.gaits[4] > 0.9
+            jumped |= character.core.gaits[5] > 0.9
             assert character.root[2] < 2.81
         assert jumped, "the jump gait is on near the area"
         with pytest.raises(ValueError, match="finite"):

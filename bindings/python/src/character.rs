@@ -242,9 +242,9 @@ impl Controller {
         self.controller.phase()
     }
 
-    /// Shares of the gaits now: stand, walk, jog, crouch, jump, bump.
+    /// Shares of the gaits now: stand, walk, jog, run, crouch, jump, bump.
     #[getter]
-    fn gaits(&self) -> [f32; 6] {
+    fn gaits(&self) -> [f32; 7] {
         self.controller.trajectory()[control::NOW].gait
     }
 

@@ -25,8 +25,8 @@ const STANDING: f32 = 0.06;
 const STAND: usize = 0;
 const WALK: usize = 1;
 const JOG: usize = 2;
-const CROUCH: usize = 3;
-const JUMP: usize = 4;
+const CROUCH: usize = 4;
+const JUMP: usize = 5;
 
 /// One moment of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

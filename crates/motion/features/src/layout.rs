@@ -8,8 +8,9 @@ pub const SAMPLES: usize = 12;
 /// Frames of the trajectory window before now, and after it.
 pub const WINDOW: usize = 60;
 
-/// Gait inputs, in order: the six of the PFNN's published network.
-pub const GAITS: [&str; 6] = ["stand", "walk", "jog", "crouch", "jump", "bump"];
+/// Gaits that a character can be asked for. A layout has inputs for some of them: the published
+/// one takes jog and run for one gait, Ambulo's own has no bumping into walls.
+pub const GAITS: [&str; 7] = ["stand", "walk", "jog", "run", "crouch", "jump", "bump"];
 
 /// A named run of numbers within a vector.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,7 +25,7 @@ pub struct Block {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum LayoutError {
-    #[error("layout '{0}' is not known; known: holden")]
+    #[error("layout '{0}' is not known; known: ambulo, holden")]
     Unknown(String),
     #[error("a layout needs between 1 and 1000 joints, not {0}")]
     Joints(usize),
@@ -36,6 +37,26 @@ pub enum LayoutError {
     Hash { expected: String, found: String },
 }
 
+/// What velocities count in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rates {
+    /// Per second; turning to the left is positive.
+    Second,
+    /// Per frame; the published yaw is that of world → root: turning to the right is positive.
+    Frame,
+}
+
+/// How a rotation is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rotations {
+    /// Three numbers: unit axis × half the angle. Jumps where an angle passes a half turn.
+    HalfLog,
+    /// Six numbers: where the X and the Y axis go. Continuous, hence easier to learn.
+    /// Source: Zhou et al., "On the Continuity of Rotation Representations in Neural Networks"
+    /// (CVPR 2019).
+    TwoAxes,
+}
+
 /// What the numbers of a network's two vectors mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
@@ -43,6 +64,10 @@ pub struct Layout {
     joints: usize,
     fps: f32,
     units_per_metre: f32,
+    /// Number of each block of the input that is a gait, with the gaits that it sums.
+    pub(crate) gaits: &'static [&'static [usize]],
+    pub(crate) rates: Rates,
+    pub(crate) rotations: Rotations,
     inputs: Vec<Block>,
     outputs: Vec<Block>,
 }
@@ -54,9 +79,30 @@ impl Layout {
     /// An unknown name, no joint or more than 1000.
     pub fn named(name: &str, joints: usize) -> Result<Self, LayoutError> {
         match name {
+            "ambulo" => Self::ambulo(joints),
             "holden" => Self::holden(joints),
             _ => Err(LayoutError::Unknown(name.into())),
         }
+    }
+
+    /// Ambulo's own: metres, velocities per second so that they mean the same at any frame rate,
+    /// rotations as two axes; 156 + 6·J numbers in and 32 + 12·J out.
+    ///
+    /// # Errors
+    /// No joint or more than 1000.
+    pub fn ambulo(joints: usize) -> Result<Self, LayoutError> {
+        Self {
+            name: "ambulo",
+            joints,
+            fps: 60.0,
+            units_per_metre: 1.0,
+            gaits: &[&[0], &[1], &[2], &[3], &[4], &[5]],
+            rates: Rates::Second,
+            rotations: Rotations::TwoAxes,
+            inputs: vec![],
+            outputs: vec![],
+        }
+        .with_blocks(["stand", "walk", "jog", "run", "crouch", "jump"].map(gait_block))
     }
 
     /// The published layout of the PFNN: centimetres, frames at 60 Hz, 120 + 6·J + 36 numbers in
@@ -68,26 +114,43 @@ impl Layout {
     /// # Errors
     /// No joint or more than 1000.
     pub fn holden(joints: usize) -> Result<Self, LayoutError> {
+        Self {
+            name: "holden",
+            joints,
+            fps: 60.0,
+            units_per_metre: 100.0,
+            gaits: &[&[0], &[1], &[2, 3], &[4], &[5], &[6]],
+            rates: Rates::Frame,
+            rotations: Rotations::HalfLog,
+            inputs: vec![],
+            outputs: vec![],
+        }
+        .with_blocks(["stand", "walk", "jog", "crouch", "jump", "bump"].map(gait_block))
+    }
+
+    fn with_blocks(mut self, gaits: [&'static str; 6]) -> Result<Self, LayoutError> {
+        let joints = self.joints;
         if !(1..=1000).contains(&joints) {
             return Err(LayoutError::Joints(joints));
         }
-        let inputs = [
+        let mut inputs = vec![
             ("trajectory_x", SAMPLES),
             ("trajectory_z", SAMPLES),
             ("direction_x", SAMPLES),
             ("direction_z", SAMPLES),
-            ("gait_stand", SAMPLES),
-            ("gait_walk", SAMPLES),
-            ("gait_jog", SAMPLES),
-            ("gait_crouch", SAMPLES),
-            ("gait_jump", SAMPLES),
-            ("gait_bump", SAMPLES),
+        ];
+        inputs.extend(gaits.map(|gait| (gait, SAMPLES)));
+        inputs.extend([
             ("joint_position", 3 * joints),
             ("joint_velocity", 3 * joints),
             ("terrain_left", SAMPLES),
             ("terrain_centre", SAMPLES),
             ("terrain_right", SAMPLES),
-        ];
+        ]);
+        let rotation = match self.rotations {
+            Rotations::HalfLog => 3,
+            Rotations::TwoAxes => 6,
+        };
         let outputs = [
             ("root_velocity", 2),
             ("root_yaw", 1),
@@ -99,16 +162,19 @@ impl Layout {
             ("direction_z", SAMPLES / 2),
             ("joint_position", 3 * joints),
             ("joint_velocity", 3 * joints),
-            ("joint_rotation", 3 * joints),
+            ("joint_rotation", rotation * joints),
         ];
-        Ok(Self {
-            name: "holden",
-            joints,
-            fps: 60.0,
-            units_per_metre: 100.0,
-            inputs: blocks(&inputs),
-            outputs: blocks(&outputs),
-        })
+        self.inputs = blocks(&inputs);
+        self.outputs = blocks(&outputs);
+        Ok(self)
+    }
+
+    /// Range of the input's or output's block of that name.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub fn range(blocks: &[Block], name: &str) -> Range<usize> {
+        blocks.iter().find(|block| block.name == name).expect("a block of that name").range.clone()
     }
 
     /// Name of the family.
@@ -193,6 +259,19 @@ impl Layout {
     }
 }
 
+fn gait_block(gait: &str) -> &'static str {
+    const BLOCKS: [&str; GAITS.len()] = [
+        "gait_stand",
+        "gait_walk",
+        "gait_jog",
+        "gait_run",
+        "gait_crouch",
+        "gait_jump",
+        "gait_bump",
+    ];
+    BLOCKS[GAITS.iter().position(|name| *name == gait).expect("a gait")]
+}
+
 fn blocks(table: &[(&'static str, usize)]) -> Vec<Block> {
     let mut start = 0;
     let place = |&(name, size)| {
@@ -221,9 +300,19 @@ mod tests {
         assert_eq!((ava.input_len(), ava.output_len()), (1302, 1751));
     }
 
+    #[test]
+    fn ambulo_has_six_gaits_and_two_axes_a_joint() {
+        let layout = Layout::ambulo(22).unwrap();
+        assert_eq!((layout.input_len(), layout.output_len()), (288, 296));
+        assert_eq!(Layout::range(layout.inputs(), "gait_run"), 84..96);
+        assert_eq!(Layout::range(layout.outputs(), "joint_rotation"), 164..296);
+        assert_eq!(layout.gaits.len(), 6);
+    }
+
     /// Bundles in the world carry this fingerprint: if it changes, so must the format's version.
     #[test]
     fn the_fingerprint_is_golden() {
+        assert_eq!(Layout::ambulo(22).unwrap().hash(), "28f8fdc6c7f8de4e");
         assert_eq!(Layout::holden(31).unwrap().hash(), "219ef9edb0527ecf");
         assert_ne!(Layout::holden(30).unwrap().hash(), Layout::holden(31).unwrap().hash());
     }

@@ -1,7 +1,8 @@
 //! The two vectors as structs, and the way from one to the other.
 
-use ambulo_rig::glam::{Quat, Vec2, Vec3};
+use ambulo_rig::glam::{Mat3, Quat, Vec2, Vec3};
 
+use crate::layout::{Rates, Rotations};
 use crate::{GAITS, Layout, SAMPLES};
 
 /// Samples of the trajectory in the output: frames 0, 10, … 50 after the next one.
@@ -102,8 +103,9 @@ impl Layout {
         let (length, speed) = self.scales();
         let mut out = Writer(x);
         out.points(&input.trajectory, length);
-        for gait in 0..GAITS.len() {
-            input.ground.iter().for_each(|g| out.put(g.gait[gait]));
+        for summed in self.gaits {
+            let share = |ground: &Ground| summed.iter().map(|&gait| ground.gait[gait]).sum();
+            input.ground.iter().for_each(|ground| out.put(share(ground)));
         }
         out.vectors(&input.joint_position, length);
         out.vectors(&input.joint_velocity, speed);
@@ -113,7 +115,8 @@ impl Layout {
         out.finish();
     }
 
-    /// Reads an input vector into an input that has as many joints.
+    /// Reads an input vector into an input that has as many joints; gaits that the layout sums
+    /// become the first of them.
     ///
     /// # Panics
     /// When joints or `x` have other lengths than the layout.
@@ -122,8 +125,9 @@ impl Layout {
         let (length, speed) = self.scales();
         let mut numbers = Reader(x);
         numbers.points(&mut input.trajectory, length);
-        for gait in 0..GAITS.len() {
-            input.ground.iter_mut().for_each(|g| g.gait[gait] = numbers.take());
+        input.ground.iter_mut().for_each(|g| g.gait = [0.0; GAITS.len()]);
+        for summed in self.gaits {
+            input.ground.iter_mut().for_each(|g| g.gait[summed[0]] = numbers.take());
         }
         numbers.vectors(&mut input.joint_position, length);
         numbers.vectors(&mut input.joint_velocity, speed);
@@ -143,17 +147,22 @@ impl Layout {
         let mut out = Writer(y);
         out.put(output.root_velocity.x * speed);
         out.put(output.root_velocity.y * speed);
-        // The published yaw is that of world → root: the character turns by its negative.
-        out.put(-output.yaw_rate / self.fps());
-        out.put(output.phase_rate / self.fps());
+        let (yaw, phase) = self.turns();
+        out.put(output.yaw_rate / yaw);
+        out.put(output.phase_rate / phase);
         output.contacts.iter().for_each(|&c| out.put(c));
         out.points(&output.trajectory, length);
         out.vectors(&output.joint_position, length);
         out.vectors(&output.joint_velocity, speed);
         for &rotation in &output.joint_rotation {
-            // The published logarithm: unit axis × half the angle, of the quaternion with w ≥ 0.
-            let nearer = if rotation.w < 0.0 { -rotation } else { rotation };
-            out.vectors(&[nearer.to_scaled_axis()], 0.5);
+            match self.rotations {
+                Rotations::HalfLog => {
+                    // Of the quaternion with w ≥ 0, as published.
+                    let nearer = if rotation.w < 0.0 { -rotation } else { rotation };
+                    out.vectors(&[nearer.to_scaled_axis()], 0.5);
+                }
+                Rotations::TwoAxes => out.vectors(&[rotation * Vec3::X, rotation * Vec3::Y], 1.0),
+            }
         }
         out.finish();
     }
@@ -168,24 +177,53 @@ impl Layout {
         let mut numbers = Reader(y);
         output.root_velocity.x = numbers.take() / speed;
         output.root_velocity.y = numbers.take() / speed;
-        output.yaw_rate = -numbers.take() * self.fps();
-        output.phase_rate = numbers.take() * self.fps();
+        let (yaw, phase) = self.turns();
+        output.yaw_rate = numbers.take() * yaw;
+        output.phase_rate = numbers.take() * phase;
         output.contacts.iter_mut().for_each(|c| *c = numbers.take());
         numbers.points(&mut output.trajectory, length);
         numbers.vectors(&mut output.joint_position, length);
         numbers.vectors(&mut output.joint_velocity, speed);
         for rotation in &mut output.joint_rotation {
-            let mut axis = [Vec3::ZERO];
-            numbers.vectors(&mut axis, 0.5);
-            *rotation = Quat::from_scaled_axis(axis[0]);
+            let mut axes = [Vec3::ZERO; 2];
+            *rotation = match self.rotations {
+                Rotations::HalfLog => {
+                    numbers.vectors(&mut axes[..1], 0.5);
+                    Quat::from_scaled_axis(axes[0])
+                }
+                Rotations::TwoAxes => {
+                    numbers.vectors(&mut axes, 1.0);
+                    from_two_axes(axes)
+                }
+            };
         }
         numbers.finish();
     }
 
     /// Factors from metres, and from metres a second, to the layout's units.
     fn scales(&self) -> (f32, f32) {
-        (self.units_per_metre(), self.units_per_metre() / self.fps())
+        let length = self.units_per_metre();
+        match self.rates {
+            Rates::Second => (length, length),
+            Rates::Frame => (length, length / self.fps()),
+        }
     }
+
+    /// Factors to radians a second to the left, and to cycles a second.
+    fn turns(&self) -> (f32, f32) {
+        match self.rates {
+            Rates::Second => (1.0, 1.0),
+            Rates::Frame => (-self.fps(), self.fps()),
+        }
+    }
+}
+
+/// The rotation whose X axis goes along the first vector, and whose Y axis lies in the plane of
+/// both; any vectors give a rotation.
+fn from_two_axes([x, y]: [Vec3; 2]) -> Quat {
+    let x = x.normalize_or(Vec3::X);
+    let z = x.cross(y).normalize_or(x.any_orthonormal_vector());
+    Quat::from_mat3(&Mat3::from_cols(x, z.cross(x), z))
 }
 
 /// Fills a vector from the front.
@@ -249,8 +287,8 @@ mod tests {
 
     const JOINTS: usize = 3;
 
-    fn at(layout: &[crate::Block], name: &str) -> usize {
-        layout.iter().find(|b| b.name == name).expect("a block of that name").range.start
+    fn at(blocks: &[crate::Block], name: &str) -> usize {
+        Layout::range(blocks, name).start
     }
 
     /// Every number lies where the published layout has it, in its unit.
@@ -260,7 +298,7 @@ mod tests {
         let mut input = Input::zero(JOINTS);
         input.trajectory[7].position = Vec2::new(0.25, 0.5);
         input.trajectory[2].direction = Vec2::new(0.6, 0.8);
-        input.ground[4].gait = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6];
+        input.ground[4].gait = [0.1, 0.2, 0.1, 0.2, 0.4, 0.5, 0.6];
         input.ground[11].height = [0.01, 0.02, 0.03];
         input.joint_position[1] = Vec3::new(0.1, 0.9, -0.2);
         input.joint_velocity[2] = Vec3::new(0.6, 1.2, -1.8);
@@ -309,6 +347,43 @@ mod tests {
         assert!((output.joint_velocity[0].y - 0.6).abs() < 1e-6);
         let turned = output.joint_rotation[1] * Vec3::Y;
         assert!(turned.abs_diff_eq(Vec3::Z, 1e-6), "{turned}");
+    }
+
+    /// Ambulo's own layout is metres and seconds throughout, and left is positive.
+    #[test]
+    fn ambulo_numbers_are_si() {
+        let layout = Layout::ambulo(1).unwrap();
+        let mut output = Output::zero(1);
+        output.root_velocity = Vec2::new(0.1, 1.5);
+        output.yaw_rate = 0.6;
+        output.phase_rate = 1.1;
+        output.joint_velocity[0] = Vec3::new(0.0, 2.0, 0.0);
+        output.joint_rotation[0] = Quat::from_rotation_x(2.5);
+        let mut y = vec![0.0; layout.output_len()];
+        layout.encode_output(&output, &mut y);
+        assert_eq!(y[..4], [0.1, 1.5, 0.6, 1.1]);
+        assert_eq!(y[Layout::range(layout.outputs(), "joint_velocity")], [0.0, 2.0, 0.0]);
+        let mut again = Output::zero(1);
+        layout.decode_output(&y, &mut again);
+        assert!(again.joint_rotation[0].angle_between(output.joint_rotation[0]) < 1e-3);
+        let mut input = Input::zero(1);
+        input.ground[3].gait = [0.0, 0.0, 0.25, 0.75, 0.0, 0.0, 0.0];
+        let mut x = vec![0.0; layout.input_len()];
+        layout.encode_input(&input, &mut x);
+        assert_eq!(x[at(layout.inputs(), "gait_run") + 3], 0.75);
+        let mut again = Input::zero(1);
+        layout.decode_input(&x, &mut again);
+        assert_eq!(again, input);
+    }
+
+    /// A network's two axes are neither unit nor at right angles, and may be anything.
+    #[test]
+    fn any_two_axes_are_a_rotation() {
+        let near = from_two_axes([Vec3::new(2.0, 0.1, 0.0), Vec3::new(0.3, 1.0, 0.0)]);
+        assert!(near.angle_between(Quat::from_rotation_z(0.05)) < 0.01);
+        for axes in [[Vec3::ZERO; 2], [Vec3::X; 2], [Vec3::Y, Vec3::NEG_Y], [Vec3::NEG_X; 2]] {
+            assert!(from_two_axes(axes).is_normalized(), "{axes:?}");
+        }
     }
 
     proptest! {
