@@ -12,6 +12,8 @@ mod axes;
 mod clip;
 mod mirror;
 mod pose;
+mod prune;
+mod roles;
 mod skeleton;
 mod terrain;
 
@@ -19,6 +21,7 @@ pub use axes::{Axes, AxesError, Axis, Conversion, Handedness};
 pub use clip::{Clip, ClipError};
 pub use mirror::{Mirror, MirrorError};
 pub use pose::{Pose, Transform};
+pub use roles::Roles;
 pub use skeleton::{Joint, Skeleton, SkeletonError};
 pub use terrain::{Flat, HeightField, HeightFieldError, Terrain};
 

@@ -1,7 +1,7 @@
 //! What a clip seems to be in: axes, unit, first frame. Reported, never applied.
 
 use ambulo_rig::glam::DVec3;
-use ambulo_rig::{Axes, Axis, Clip, Handedness};
+use ambulo_rig::{Axes, Axis, Clip, Handedness, Roles};
 
 use crate::Positions;
 
@@ -137,31 +137,17 @@ struct Landmarks {
 
 impl Landmarks {
     fn find(clip: &Clip) -> Self {
-        let joints = clip.skeleton().joints();
-        let names: Vec<String> = joints.iter().map(|joint| plain(&joint.name)).collect();
-        let middle = |wanted: &[&str]| {
-            wanted.iter().find_map(|wanted| names.iter().position(|name| name == wanted))
-        };
-        let sided = |side: Side, wanted: &[&str]| {
-            let parts: Vec<_> = names.iter().map(|name| side.strip(name)).collect();
-            wanted.iter().find_map(|wanted| parts.iter().position(|part| *part == Some(wanted)))
-        };
-        let both =
-            |wanted: &[&str]| Some((sided(Side::Left, wanted)?, sided(Side::Right, wanted)?));
-        let thighs = both(&["upleg", "upperleg", "thigh", "femur", "hip"]);
-        let arms = both(&["arm", "upperarm", "uparm", "humerus", "shoulder"]);
-        let hands = both(&["hand", "wrist"]);
-        let feet = both(&["foot", "ankle"]);
-        let toes = both(&["toebase", "toe", "toes"]);
-        let list = |pair: Option<(usize, usize)>| pair.map_or(vec![], |(l, r)| vec![l, r]);
-        let ends = list(feet).into_iter().zip(list(toes)).collect();
+        let roles = Roles::by_name(clip.skeleton());
+        let list = |pair: Option<[usize; 2]>| pair.map_or(vec![], Vec::from);
+        let (feet, toes) = (list(roles.feet), list(roles.toes));
+        let pairs = [roles.thighs, roles.arms].into_iter().flatten();
         Self {
-            hips: middle(&["hips", "hip", "pelvis", "root"]),
-            head: middle(&["head", "neck", "upperneck", "neck1"]),
-            feet: [list(feet), list(toes)].concat(),
-            toes: ends,
-            pairs: [thighs, arms].into_iter().flatten().collect(),
-            arms: arms.zip(hands).map(|(arms, hands)| [(arms.0, hands.0), (arms.1, hands.1)]),
+            hips: roles.hips,
+            head: roles.head,
+            toes: feet.iter().copied().zip(toes.iter().copied()).collect(),
+            feet: [feet, toes].concat(),
+            pairs: pairs.map(|[left, right]| (left, right)).collect(),
+            arms: roles.arms.zip(roles.hands).map(|(a, h)| [(a[0], h[0]), (a[1], h[1])]),
         }
     }
 
@@ -199,31 +185,6 @@ impl Landmarks {
             && left.dot(lateral) > 0.9
             && right.dot(lateral) < -0.9
     }
-}
-
-#[derive(Clone, Copy)]
-enum Side {
-    Left,
-    Right,
-}
-
-impl Side {
-    /// What is left of a plain name without the mark of this side.
-    fn strip(self, name: &str) -> Option<&str> {
-        let (word, letter) = match self {
-            Self::Left => ("left", "l"),
-            Self::Right => ("right", "r"),
-        };
-        let stripped = |mark| name.strip_prefix(mark).or_else(|| name.strip_suffix(mark));
-        stripped(word).or_else(|| stripped(letter))
-    }
-}
-
-/// A name in lower case, without namespace and marks: `mixamorig:Left_Foot` is `leftfoot`.
-fn plain(name: &str) -> String {
-    let name = name.rsplit(':').next().unwrap_or(name);
-    let letters = name.chars().filter(|c| c.is_alphanumeric());
-    letters.collect::<String>().to_lowercase()
 }
 
 /// A direction in every frame that has it.
