@@ -1,6 +1,6 @@
 """Types of the native module."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import Any, Literal, TypedDict
 
@@ -27,6 +27,7 @@ class Controller:
         start: tuple[float, float] = (0.0, 0.0),
         facing: float = 0.0,
         responsive: bool = False,
+        tuning: str | None = None,
     ) -> None: ...
     def set_areas(
         self,
@@ -69,7 +70,9 @@ class Model:
         output_mean: Floats,
         output_std: Floats,
     ) -> Model: ...
-    def to_bytes(self) -> bytes: ...
+    def to_bytes(self, half: bool = False) -> bytes: ...
+    @property
+    def half(self) -> bool: ...
     def header_json(self) -> str: ...
     @property
     def inputs(self) -> int: ...
@@ -153,3 +156,32 @@ def read_motion(
     positions: Literal["replace", "add"] = "replace",
 ) -> tuple[Clip, dict[str, Any]]: ...
 def write_motion(path: str | PathLike[str], clip: Clip) -> list[str]: ...
+
+# -- data sets ------------------------------------------------------------------------------------
+
+def dataset_settings() -> str: ...
+def dataset_check(text: str) -> str: ...
+def dataset_plan(
+    files: Sequence[str],
+    folder: str,
+    settings: str = "",
+    *,
+    threads: int = 1,
+    progress: Callable[[float], object] | None = None,
+) -> tuple[str, list[tuple[str, str]]]: ...
+def dataset_build(
+    folder: str,
+    manifest: str,
+    *,
+    threads: int = 1,
+    progress: Callable[[float], object] | None = None,
+) -> str: ...
+
+class _ClipRows(TypedDict):
+    rows: Floats
+    runs: list[tuple[int, int]]
+    fps: float
+
+def clip_rows(
+    model: Model, path: str, *, axes: str | None = None, mirrored: bool = False
+) -> _ClipRows: ...

@@ -24,6 +24,18 @@ class Model:
         self.core = core
         self.header: dict[str, Any] = json.loads(core.header_json())
 
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Model:
+        """Read a bundle's bytes.
+
+        Raises:
+            ModelError: they are not a complete, consistent bundle; the message says what is wrong.
+        """
+        try:
+            return cls(_core.Model.from_bytes(data))
+        except ValueError as error:
+            raise ModelError(str(error)) from error
+
     @property
     def inputs(self) -> int:
         """Length of the input vector."""
@@ -51,6 +63,14 @@ class Model:
         joints = enumerate(self.header["parts"]["skeleton"])
         return tuple(i for i, joint in joints for _ in joint.get("tips", []))
 
+    @property
+    def tuning(self) -> dict[str, Any]:
+        """What the model asks its controller to do differently from the published loop."""
+        tuning = self.header["parts"].get("tuning", {})
+        if not isinstance(tuning, dict):
+            raise ModelError(f"the bundle's 'tuning' part is broken: {tuning!r} is not an object")
+        return dict(tuning)
+
     def predict(self, x: ArrayLike, phase: ArrayLike) -> NDArray[np.float32]:
         """Run the network.
 
@@ -72,20 +92,38 @@ class Model:
             )
         return self.core.predict(np.ascontiguousarray(x), np.ascontiguousarray(phase))
 
-    def save(self, path: str | Path) -> None:
-        """Write the model as one safetensors file, atomically."""
-        write_atomic(path, self.core.to_bytes())
+    def to_bytes(self, half: bool = False) -> bytes:
+        """The model as a safetensors file.
+
+        Args:
+            half: layers as float16, rounded to nearest: half the size. Means and deviations stay
+                float32, and so does everything in memory once it is loaded.
+
+        Raises:
+            ModelError: a weight is too large for half precision; the message names its tensor.
+        """
+        try:
+            return self.core.to_bytes(half)
+        except ValueError as error:
+            raise ModelError(str(error)) from error
+
+    def save(self, path: str | Path, half: bool = False) -> None:
+        """Write the model as one safetensors file, atomically; `half` as in `to_bytes`."""
+        write_atomic(path, self.to_bytes(half))
 
     def info(self) -> dict[str, Any]:
-        """What a person wants to know of it, as plain values."""
-        header = self.header
+        """What a person wants to know of it, as plain values; `bytes` is the size of its file."""
+        header, half = self.header, self.core.half
         return {
             "kind": header["kind"],
+            "precision": "float16" if half else "float32",
+            "bytes": len(self.to_bytes(half)),
             "layout": header["layout"]["name"],
             "layout_hash": header["layout"]["hash"],
             "widths": self.core.widths,
             "joints": len(header["parts"].get("skeleton", [])),
             "fps": header["fps"],
+            "tuning": self.tuning,
             "licence": header["licence"],
             "provenance": header["provenance"],
         }

@@ -51,9 +51,15 @@ def network(data: Path) -> Path:
     return folder
 
 
-def follower() -> Model:
-    """A network of one affine layer that foresees what it is told and walks along it."""
-    layout = _core.layout("holden", len(JOINTS))
+def follower(layout_name: str = "holden", **parts: object) -> Model:
+    """A network of one affine layer that foresees what it is told and walks along it.
+
+    `parts` are put into the bundle beside its skeleton and feet.
+    """
+    layout = _core.layout(layout_name, len(JOINTS))
+    metre, published = layout["units_per_metre"], layout_name == "holden"
+    # A tenth of the way to the sample ten frames ahead; and a cycle a second.
+    pace, turn, cycles = (0.1, -0.1, 1.0 / 60.0) if published else (6.0, 6.0, 1.0)
     starts = {
         side: dict(zip((n for n, _ in table), np.cumsum([0] + [s for _, s in table]), strict=False))
         for side, table in (("in", layout["inputs"]), ("out", layout["outputs"]))
@@ -65,15 +71,18 @@ def follower() -> Model:
         for k in range(6):
             weights[starts["out"][name] + k, starts["in"][name] + 6 + k] = 1.0
     out = starts["out"]
-    weights[out["root_velocity"], starts["in"]["trajectory_x"] + 7] = 0.1
-    weights[out["root_velocity"] + 1, starts["in"]["trajectory_z"] + 7] = 0.1
-    weights[out["root_yaw"], starts["in"]["direction_x"] + 7] = -0.1
-    bias[out["phase_rate"]] = 1.0 / 60.0
+    weights[out["root_velocity"], starts["in"]["trajectory_x"] + 7] = pace
+    weights[out["root_velocity"] + 1, starts["in"]["trajectory_z"] + 7] = pace
+    weights[out["root_yaw"], starts["in"]["direction_x"] + 7] = turn
+    bias[out["phase_rate"]] = cycles
     bias[out["contacts"] : out["contacts"] + 4] = 0.9
     stance = np.zeros((len(JOINTS), 3))
     for joint, (_, parent, offset) in enumerate(JOINTS):
         stance[joint] = np.array(offset) + (stance[parent] if parent >= 0 else (0.0, 0.98, 0.0))
-    bias[out["joint_position"] :][: stance.size] = 100.0 * stance.ravel()
+    bias[out["joint_position"] :][: stance.size] = metre * stance.ravel()
+    if not published:
+        axes = np.tile([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], len(JOINTS))
+        bias[out["joint_rotation"] :][: axes.size] = axes
     header = {
         "format": 1,
         "kind": "pfnn",
@@ -87,6 +96,7 @@ def follower() -> Model:
                 {"name": n, "parent": None if p < 0 else p, "offset": o} for n, p, o in JOINTS
             ],
             "feet": {"joints": [3, 4, 7, 8], "heights": [0.09, 0.04, 0.09, 0.04]},
+            **parts,
         },
     }
     mean = bias.astype(np.float32)
@@ -109,3 +119,9 @@ def follower() -> Model:
 def toy() -> Model:
     """See `follower`."""
     return follower()
+
+
+@pytest.fixture(scope="session", params=["holden", "ambulo"])
+def toys(request: pytest.FixtureRequest) -> Model:
+    """One of each layout."""
+    return follower(request.param)

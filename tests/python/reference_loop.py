@@ -92,7 +92,7 @@ class Reference:
         elif self.crouch > 0.1:
             goal[3] = self.crouch
         else:
-            goal[2 if gait == "jog" else 1] = 1.0
+            goal[2 if gait in ("jog", "run") else 1] = 1.0
         self.gait[NOW] = self.gait[NOW] * 0.9 + goal * 0.1
 
     def _bend(self) -> None:

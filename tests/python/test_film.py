@@ -269,6 +269,14 @@ def test_a_skeleton_of_unknown_names_is_drawn_too() -> None:
     assert 0.01 < changed(stage, 0, front_camera()).mean() < 0.2
 
 
+def test_a_body_on_four_legs_is_no_mannequin() -> None:
+    """A dog's joints are named as a person's; its trunk lies."""
+    known = walker()
+    lying = known.positions[..., [0, 2, 1]]
+    stage = Stage(dataclasses.replace(known, positions=lying), Flat(), np.zeros((0, 2)))
+    assert not stage.mannequin.human and Stage(known, Flat(), np.zeros((0, 2))).mannequin.human
+
+
 def test_the_post_hides_and_is_hidden() -> None:
     """A waypoint between camera and character is in front; one beyond is behind."""
     recording, camera = walker(), front_camera((320, 240))

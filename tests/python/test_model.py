@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from ambulo import Model, ModelError, load_model
+from ambulo import Controller, Model, ModelError, _core, load_model
 from ambulo.cli import cli
 from ambulo.holden import JOINTS, import_holden
+from conftest import follower
 
 SHAPES = {
     "W0": (512, 342), "W1": (512, 512), "W2": (311, 512),
@@ -200,6 +201,75 @@ def test_predict_refuses_what_does_not_fit(toy: Model) -> None:
     # Float64, lists and strided arrays are taken too.
     wide = np.zeros((4, 444))
     assert np.array_equal(toy.predict(wide[::2, ::2], [0, 0]), toy.predict(wide[:2, :222], [0, 1]))
+
+
+def scaled(model: Model, factor: float) -> Model:
+    """The same with every weight of the layers times `factor`."""
+    core, n = model.core, model.core.normalisation()
+    layers = [((w * np.float32(factor)), b) for w, b in core.layers()]
+    return Model(_core.Model.build(core.header_json(), layers, **n))
+
+
+def test_half_precision_is_what_numpy_makes_of_it(toys: Model, tmp_path: Path) -> None:
+    odd = scaled(toys, 1.0 / 3.0)
+    whole, half = tmp_path / "whole.safetensors", tmp_path / "half.safetensors"
+    odd.save(whole)
+    odd.save(half, half=True)
+    back = load_model(half)
+    for (w, b), (w2, b2) in zip(odd.core.layers(), back.core.layers(), strict=True):
+        assert np.array_equal(w.astype(np.float16).astype(np.float32), w2) and (w != w2).any()
+        assert np.array_equal(b.astype(np.float16).astype(np.float32), b2)
+    assert back.header == odd.header
+    n = odd.core.normalisation()
+    assert all(np.array_equal(n[key], value) for key, value in back.core.normalisation().items())
+    assert (odd.info()["precision"], back.info()["precision"]) == ("float32", "float16")
+    for path, model in ((whole, odd), (half, back)):
+        assert model.info()["bytes"] == path.stat().st_size
+    assert half.stat().st_size < 0.6 * whole.stat().st_size
+    with pytest.raises(
+        ModelError, match=r"tensor 'layers.0.weight': number \d+ is .*, beyond half"
+    ):
+        scaled(toys, 1e6).save(tmp_path / "none.safetensors", half=True)
+    assert not (tmp_path / "none.safetensors").exists()
+
+
+def test_half_command(toy: Model, tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    whole, half = tmp_path / "whole.safetensors", tmp_path / "half.safetensors"
+    odd = scaled(toy, 1.0 / 3.0)
+    odd.save(whole)
+    arguments = ["model", "half", str(whole), "-o", str(half)]
+    dry = run(cli, [*arguments, "--dry-run"])
+    assert dry.exit_code == 0 and "nothing written" in dry.output and not half.exists()
+    done = run(cli, [*arguments, "--json"])
+    assert done.exit_code == 0, done.output
+    report = json.loads(done.stdout)
+    assert report["bytes"] == half.stat().st_size < 0.6 * report["bytes_before"]
+    assert report["bytes_before"] == whole.stat().st_size
+    assert 0.0 < report["largest_change_sd"] < 0.01
+    assert run(cli, arguments).exit_code == 1, "not over an existing file"
+    shown = run(cli, ["model", "info", str(half)]).output
+    assert "precision  float16" in shown and f"{half.stat().st_size:,}" in shown
+    scaled(toy, 1e6).save(whole)
+    refused = run(cli, [*arguments, "--overwrite"])
+    assert refused.exit_code == 1 and "beyond half precision" in refused.output
+
+
+def test_a_model_carries_its_tuning(tmp_path: Path) -> None:
+    path = tmp_path / "tuned.safetensors"
+    follower("ambulo", tuning={"stand_freedom": 1.0, "speed_limit": [0.8, 1.25]}).save(path)
+    model = load_model(path)
+    assert model.tuning == {"stand_freedom": 1.0, "speed_limit": [0.8, 1.25]}
+    info = CliRunner().invoke(cli, ["model", "info", str(path)])
+    assert "tuning  speed_limit [0.8, 1.25], stand_freedom 1.0" in info.output
+    plain = CliRunner().invoke(cli, ["model", "info", str(path), "--json"])
+    assert json.loads(plain.stdout)["tuning"] == model.tuning
+    Controller(model)
+    broken = follower("ambulo", tuning={"stand_freedom": 2.0})
+    with pytest.raises(ModelError, match="'tuning' part is broken: a number that is out of range"):
+        Controller(broken)
+    with pytest.raises(ModelError, match="'tuning' part is broken"):
+        follower(tuning=[1]).info()
 
 
 def test_files_that_are_no_models_are_refused_by_name(toy: Model, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ WISHES = {
     "back": lambda i: {"velocity": (0.0, -1.2), "facing": (0.0, 2.0), "strafe": 1.0},
     "crouch": lambda i: {"velocity": (0.0, 1.2), "gait": "crouch"},
     "jog": lambda i: {"velocity": (0.5, 3.5), "gait": "jog"},
+    "run": lambda i: {"velocity": (0.5, 3.5), "gait": "run"},
     "stop": lambda i: {"velocity": (0.0, 1.5) if i < 100 else (0.0, 0.0)},
 }
 

@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from ambulo import Controller, Model, ModelError, Terrain, load_model
+from ambulo import Controller, Model, ModelError, Terrain, _core, load_model
 from ambulo.character import Step
 from ambulo.cli import character, cli
 from ambulo.evaluate import metrics
 from ambulo.evaluate.track import Track, TrackError, Waypoint, load_track, parse_track
 from ambulo.evaluate.walk import summarise, walk_laps
 from ambulo.recording import Recording
+from conftest import follower
 
 SMALL = """
 name = "small"
@@ -83,7 +84,7 @@ class TestTracks:
                 ("[6, 6]", "[6.3, 0.4]"),
                 r"more than reach = 0.5 m from the one before, found '0.5 m",
             ),
-            (('"jog"', '"fly"'), r"waypoint\[1\].gait: expected one of walk, jog, crouch"),
+            (('"jog"', '"fly"'), r"waypoint\[1\].gait: expected one of walk, jog, crouch, run"),
             (("[1, 0]", "[0, 0]"), r"waypoint\[2\].strafe: expected a direction"),
             (("reach = 0.5", "reach = true"), "reach: expected a number"),
             (("reach", "raech"), "raech: expected one of name, reach"),
@@ -199,10 +200,10 @@ class TestTerrain:
 
 
 class TestWalking:
-    def test_a_follower_reaches_every_waypoint(self, toy: Model) -> None:
+    def test_a_follower_reaches_every_waypoint(self, toys: Model) -> None:
         track = parse_track(SMALL, "t")
         done: list[float] = []
-        laps = list(walk_laps(toy, track, Terrain.flat(), 3, on_progress=done.append))
+        laps = list(walk_laps(toys, track, Terrain.flat(), 3, on_progress=done.append))
         assert done == sorted(done) and done[-1] <= 3.0
         for number, lap in enumerate(laps):
             figures, r = lap.figures, lap.recording
@@ -249,8 +250,16 @@ class TestWalking:
         lap = next(iter(walk_laps(toy, parse_track(text, "t"), Terrain.flat(), 1)))
         assert lap.figures.waypoints_reached < 3
 
-    def test_outputs(self, toy: Model, tmp_path: Path) -> None:
-        toy.save(tmp_path / "toy.safetensors")
+    @pytest.mark.parametrize("gait", ["run", "auto"])
+    def test_every_gait_is_walked(self, toys: Model, gait: str) -> None:
+        track = parse_track(SMALL.replace('"jog"', f'"{gait}"'), "t")
+        lap = next(iter(walk_laps(toys, track, Terrain.flat(), 1)))
+        r = lap.recording
+        assert lap.figures.waypoints_reached == 3 and lap.figures.held_frames == 0
+        assert {r.gait_names[g] for g in r.gait[r.leg == 1]} == {gait}
+
+    def test_outputs(self, toys: Model, tmp_path: Path) -> None:
+        toys.save(tmp_path / "toy.safetensors")
         (tmp_path / "t.toml").write_text(SMALL)
         out = tmp_path / "out"
         arguments = ["walk", str(tmp_path / "toy.safetensors"), "--track", str(tmp_path / "t.toml")]
@@ -275,7 +284,7 @@ class TestWalking:
         frames = round(summary["laps"][0]["time_s"] * 60)
         assert clip.frames == frames and clip.fps == pytest.approx(60.0)
         # The file is in centimetres; its hips go where the character went.
-        lap = next(iter(walk_laps(toy, parse_track(SMALL, "t"), Terrain.flat(), 1)))
+        lap = next(iter(walk_laps(toys, parse_track(SMALL, "t"), Terrain.flat(), 1)))
         expected = lap.recording.positions
         assert np.abs(clip.positions() / 100.0 - expected).max() < 1e-4
 
@@ -400,6 +409,75 @@ class TestController:
         assert character.step(-1.0).event == "held: dt is negative or not finite"
         assert np.array_equal(character.positions(), before)
         assert character.step(2.5).event == "skipped: 1.5 s"
+
+    def test_gaits_by_name_and_by_speed(self, toys: Model) -> None:
+        # Stand, walk, jog, run, crouch, jump, bump: what the network is told.
+        for gait, speed, expected in [
+            ("walk", 1.5, [0, 1, 0, 0, 0]),
+            ("jog", 3.0, [0, 0, 1, 0, 0]),
+            ("run", 5.0, [0, 0, 0, 1, 0]),
+            ("crouch", 1.0, [0, 0, 0, 0, 1]),
+            ("auto", 0.0, [1, 0, 0, 0, 0]),
+            ("auto", 1.5, [0, 1, 0, 0, 0]),
+            ("auto", 2.1, [0, 0.5, 0.5, 0, 0]),
+            ("auto", 3.0, [0, 0, 1, 0, 0]),
+            ("auto", 3.9, [0, 0, 0.5, 0.5, 0]),
+            ("auto", 5.0, [0, 0, 0, 1, 0]),
+        ]:
+            character = Controller(toys)
+            for _ in range(120):
+                assert character.step(1 / 60, (0.0, speed), gait=gait).event is None
+            assert character.core.gaits[:5] == pytest.approx(expected, abs=1e-4), (gait, speed)
+
+    def test_a_tuning_of_ones_own(self, toys: Model) -> None:
+        for tuning, message in [
+            ({"stand_freedom": 2.0}, "the tuning has a number"),
+            ({"speed": 1.0}, "tuning: unknown field `speed`, expected one of"),
+            ({"speed_limit": [0.8]}, "tuning: invalid length 1"),
+            ({"pose_halflife": math.nan}, "tuning: "),
+        ]:
+            with pytest.raises(ModelError, match=message):
+                Controller(toys, tuning=tuning)
+
+        def gone(seconds: float, **options) -> float:
+            character = Controller(toys, **options)
+            for _ in range(round(60 * seconds)):
+                character.step(1 / 60, (0.0, 1.5))
+            return character.root[2]
+
+        assert gone(2, tuning={}) == gone(2)
+        assert gone(2, tuning={"velocity_halflife": 1.0}) < gone(2) - 0.1
+        assert gone(2, tuning={"speed_limit": [0.8, 1.3]}) != gone(2)
+
+    def test_the_models_own_tuning_is_used(self) -> None:
+        def far(model: Model, **options) -> float:
+            character = Controller(model, **options)
+            for _ in range(120):
+                character.step(1 / 60, (0.0, 1.5))
+            return character.root[2]
+
+        slow = follower("ambulo", tuning={"velocity_halflife": 1.0})
+        assert far(slow) < far(follower("ambulo")) - 0.1
+        assert far(slow, tuning={}) == far(follower("ambulo"))
+        # Responsive changes only how the path bends.
+        quick = far(slow, responsive=True)
+        assert far(slow) != quick < far(follower("ambulo"), responsive=True) - 0.1
+
+    def test_standing_is_as_free_as_the_tuning_says(self) -> None:
+        # A network that sways to its left and foresees the same path.
+        model = follower("ambulo")
+        layers = [(0.0 * w, b.copy()) for w, b in model.core.layers()]
+        n = model.core.normalisation()
+        n["output_mean"][0] = 0.06
+        swaying = Model(_core.Model.build(model.core.header_json(), layers, **n))
+        for freedom, metres in ((0.0, 0.0), (0.5, 0.03), (1.0, 0.06)):
+            character = Controller(swaying, tuning={"stand_freedom": freedom})
+            for _ in range(61):
+                character.step(1 / 60)
+            assert character.root[0] == pytest.approx(metres, abs=2e-3)
+            # The pose that is shown came before the last two steps' turns.
+            turns = 2.0 * math.pi * (0.1 + 0.9 * freedom) * 59 / 60
+            assert math.cos(character.phase - turns) == pytest.approx(1.0, abs=1e-4)
 
     def test_walls_and_areas(self, toy: Model) -> None:
         character = Controller(toy)

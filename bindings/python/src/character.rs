@@ -95,9 +95,12 @@ fn gait_named(name: &str) -> PyResult<Gait> {
     match name {
         "walk" => Ok(Gait::Walk),
         "jog" => Ok(Gait::Jog),
+        "run" => Ok(Gait::Run),
         "crouch" => Ok(Gait::Crouch),
+        "auto" => Ok(Gait::Auto),
         _ => {
-            let message = format!("gait '{name}' is not known; expected walk, jog or crouch");
+            let expected = "walk, jog, run, crouch or auto";
+            let message = format!("gait '{name}' is not known; expected {expected}");
             Err(PyValueError::new_err(message))
         }
     }
@@ -122,18 +125,24 @@ fn rows<const N: usize>(rows: impl ExactSizeIterator<Item = [f32; N]>) -> Array2
 #[pymethods]
 impl Controller {
     #[new]
-    #[pyo3(signature = (model, *, terrain = None, start = (0.0, 0.0), facing = 0.0, responsive = false))]
+    #[pyo3(signature = (model, *, terrain = None, start = (0.0, 0.0), facing = 0.0, responsive = false, tuning = None))]
     fn new(
         model: &Model,
         terrain: Option<&Terrain>,
         start: (f32, f32),
         facing: f32,
         responsive: bool,
+        tuning: Option<&str>,
     ) -> PyResult<Self> {
         let model = control::Model::new(model.bundle.clone()).map_err(value_error)?;
         let ground = terrain.map_or(Ground::Flat(rig::Flat(0.0)), |t| t.ground.clone());
         let areas = Areas::default();
-        let tuning = if responsive { Tuning::responsive() } else { Tuning::default() };
+        let tuning = match tuning {
+            Some(json) => serde_json::from_str(json)
+                .map_err(|error| PyValueError::new_err(format!("tuning: {error}")))?,
+            None => model.tuning(),
+        };
+        let tuning: Tuning = if responsive { tuning.responsive() } else { tuning };
         let world = World { terrain: ground.as_terrain(), areas: &areas };
         let start = Vec2::new(start.0, start.1);
         let pose = model.skeleton().rest_pose();

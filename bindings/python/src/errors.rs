@@ -2,6 +2,7 @@
 
 use std::io;
 
+use ambulo_dataset::DatasetError;
 use ambulo_formats::files::FileError;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -38,4 +39,15 @@ pub fn file_error(py: Python<'_>, error: FileError) -> PyErr {
         .and_then(|()| value.setattr("expected", expected))
         .and_then(|()| value.setattr("found", found));
     set.err().unwrap_or(error)
+}
+
+/// A data set that cannot be built: `OSError` where a file cannot be read or written, else
+/// `ValueError`.
+pub fn dataset_error(error: DatasetError) -> PyErr {
+    match error {
+        DatasetError::Io(path, source) => {
+            io::Error::new(source.kind(), format!("{}: {source}", path.display())).into()
+        }
+        error => value_error(error),
+    }
 }

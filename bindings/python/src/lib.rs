@@ -1,6 +1,7 @@
 //! The Python package's native module: a shell around the crates, no logic of its own.
 
 mod character;
+mod dataset;
 mod errors;
 mod model;
 mod motion;
@@ -12,6 +13,8 @@ use pyo3::prelude::*;
 mod _core {
     #[pymodule_export]
     use crate::character::{Controller, Terrain, drawn_offsets};
+    #[pymodule_export]
+    use crate::dataset::{clip_rows, dataset_build, dataset_check, dataset_plan, dataset_settings};
     #[pymodule_export]
     use crate::errors::MotionFileError;
     #[pymodule_export]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ambulo_features::{Block, Layout};
-use ambulo_net::{Bundle, CONTROL_POINTS, Layer, Network, Normalisation, spline_shares};
+use ambulo_net::{Bundle, CONTROL_POINTS, Layer, Network, Normalisation, Precision, spline_shares};
 use numpy::ndarray::Array2;
 use numpy::{
     IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
@@ -72,9 +72,17 @@ impl Model {
         Ok(Self { bundle: Arc::new(bundle) })
     }
 
-    /// The bundle as a file's bytes.
-    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.bundle.to_bytes().map_err(value_error)?))
+    /// The bundle as a file's bytes, its layers in half precision if that is asked for.
+    #[pyo3(signature = (half = false))]
+    fn to_bytes<'py>(&self, py: Python<'py>, half: bool) -> PyResult<Bound<'py, PyBytes>> {
+        let precision = if half { Precision::Half } else { Precision::Single };
+        Ok(PyBytes::new(py, &self.bundle.to_bytes(precision).map_err(value_error)?))
+    }
+
+    /// Whether the layers were in half precision in the bytes that it was read from.
+    #[getter]
+    fn half(&self) -> bool {
+        self.bundle.precision() == Precision::Half
     }
 
     /// The header as JSON text.

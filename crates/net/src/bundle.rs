@@ -1,12 +1,14 @@
 //! One file that holds a network and everything needed to use it rightly.
 //!
-//! A safetensors file. Tensors, all float32: `layers.N.weight` (4, outputs, inputs),
-//! `layers.N.bias` (4, outputs), `input.mean`, `input.std`, `output.mean`, `output.std`. Its
-//! metadata has one entry, `ambulo`: the [`Header`] as JSON. One entry, because the order of
-//! several is not fixed and the same bundle must always be the same bytes.
+//! A safetensors file. Tensors: `layers.N.weight` (4, outputs, inputs), `layers.N.bias`
+//! (4, outputs), `input.mean`, `input.std`, `output.mean`, `output.std`. Each is float32, or float16
+//! to halve the file; in memory all are float32. Its metadata has one entry, `ambulo`: the
+//! [`Header`] as JSON. One entry, because the order of several is not fixed and the same bundle
+//! must always be the same bytes.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use half::f16;
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensorError, SafeTensors};
 use serde::{Deserialize, Serialize};
@@ -18,6 +20,17 @@ pub const FORMAT_VERSION: u32 = 1;
 
 const METADATA_KEY: &str = "ambulo";
 const NORMALISATION: [&str; 4] = ["input.mean", "input.std", "output.mean", "output.std"];
+
+/// How the weights and biases of a bundle are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// float32: nothing is lost.
+    #[default]
+    Single,
+    /// float16, rounded to nearest: half the size, 11 significant bits. Means and deviations stay
+    /// float32, since they carry the units.
+    Half,
+}
 
 /// What the two vectors are made of: blocks by name and size, in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +92,11 @@ pub enum BundleError {
     Extra(String),
     #[error("tensor '{tensor}': expected {expected}, got {found}")]
     Tensor { tensor: String, expected: &'static str, found: String },
+    #[error(
+        "tensor '{tensor}': number {index} is {value}, beyond half precision (65504): write it in \
+         single precision"
+    )]
+    BeyondHalf { tensor: String, index: usize, value: f32 },
     #[error("the layout's {side} blocks sum to {blocks}, the network has {network} {side}")]
     Layout { side: &'static str, blocks: usize, network: usize },
     #[error(transparent)]
@@ -90,6 +108,7 @@ pub enum BundleError {
 pub struct Bundle {
     header: Header,
     network: Network,
+    precision: Precision,
 }
 
 impl Bundle {
@@ -110,7 +129,7 @@ impl Bundle {
                 return Err(BundleError::Layout { side, blocks, network });
             }
         }
-        Ok(Self { header, network })
+        Ok(Self { header, network, precision: Precision::Single })
     }
 
     /// Everything but the numbers.
@@ -121,6 +140,11 @@ impl Bundle {
     /// The network.
     pub fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// That in which the bytes it was read from hold its layers: half only if all of them are.
+    pub fn precision(&self) -> Precision {
+        self.precision
     }
 
     /// Reads a bundle; the bytes may come from anywhere.
@@ -142,36 +166,75 @@ impl Bundle {
         }
         let header: Header = serde_json::from_str(json).map_err(BundleError::Header)?;
         check_header(&header)?;
-        Self::new(header, read_network(&SafeTensors::deserialize(bytes)?)?)
+        let tensors = SafeTensors::deserialize(bytes)?;
+        let mut bundle = Self::new(header, read_network(&tensors)?)?;
+        let layers = tensors.iter().filter(|(name, _)| !NORMALISATION.contains(name));
+        if layers.into_iter().all(|(_, tensor)| tensor.dtype() == Dtype::F16) {
+            bundle.precision = Precision::Half;
+        }
+        Ok(bundle)
     }
 
-    /// The file's bytes: the same bundle always gives the same.
+    /// The file's bytes: the same bundle in the same precision always gives the same.
     ///
     /// # Errors
-    /// When the container refuses (it does not for a bundle that was checked).
-    pub fn to_bytes(&self) -> Result<Vec<u8>, BundleError> {
+    /// A weight or bias too large for half precision.
+    pub fn to_bytes(&self, precision: Precision) -> Result<Vec<u8>, BundleError> {
         let json = serde_json::to_string(&self.header).map_err(BundleError::Header)?;
-        let bytes =
-            |values: &[f32]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
         let mut tensors = Vec::new();
         for (index, layer) in self.network.layers().iter().enumerate() {
             let (inputs, outputs) = (layer.inputs(), layer.outputs());
+            let weight = format!("layers.{index}.weight");
             let shape = vec![CONTROL_POINTS, outputs, inputs];
-            tensors.push((format!("layers.{index}.weight"), shape, bytes(&layer.weights())));
+            tensors.push(Stored::new(weight, shape, &layer.weights(), precision)?);
+            let bias = format!("layers.{index}.bias");
             let shape = vec![CONTROL_POINTS, outputs];
-            tensors.push((format!("layers.{index}.bias"), shape, bytes(&layer.biases())));
+            tensors.push(Stored::new(bias, shape, &layer.biases(), precision)?);
         }
         let n = self.network.normalisation();
         let values = [&n.input_mean, &n.input_std, &n.output_mean, &n.output_std];
         for (name, values) in NORMALISATION.into_iter().zip(values) {
-            tensors.push((name.to_owned(), vec![values.len()], bytes(values)));
+            let shape = vec![values.len()];
+            tensors.push(Stored::new(name.to_owned(), shape, values, Precision::Single)?);
         }
-        let views = tensors.iter().map(|(name, shape, bytes)| {
-            Ok((name.as_str(), TensorView::new(Dtype::F32, shape.clone(), bytes)?))
-        });
+        let views = tensors
+            .iter()
+            .map(|t| Ok((t.name.as_str(), TensorView::new(t.dtype, t.shape.clone(), &t.bytes)?)));
         let views = views.collect::<Result<Vec<_>, SafeTensorError>>()?;
         let metadata = HashMap::from([(METADATA_KEY.to_owned(), json)]);
         Ok(safetensors::serialize(views, Some(metadata))?)
+    }
+}
+
+/// A tensor as the file holds it.
+struct Stored {
+    name: String,
+    dtype: Dtype,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl Stored {
+    fn new(
+        name: String,
+        shape: Vec<usize>,
+        values: &[f32],
+        precision: Precision,
+    ) -> Result<Self, BundleError> {
+        let (dtype, bytes) = match precision {
+            Precision::Single => {
+                (Dtype::F32, values.iter().flat_map(|v| v.to_le_bytes()).collect())
+            }
+            Precision::Half => {
+                let halves: Vec<_> = values.iter().map(|&v| f16::from_f32(v)).collect();
+                if let Some(index) = halves.iter().position(|half| !half.is_finite()) {
+                    let value = values[index];
+                    return Err(BundleError::BeyondHalf { tensor: name, index, value });
+                }
+                (Dtype::F16, halves.iter().flat_map(|half| half.to_le_bytes()).collect())
+            }
+        };
+        Ok(Self { name, dtype, shape, bytes })
     }
 }
 
@@ -220,13 +283,19 @@ fn read_network(tensors: &SafeTensors<'_>) -> Result<Network, BundleError> {
 
 fn floats(tensors: &SafeTensors<'_>, name: &str) -> Result<(Vec<usize>, Vec<f32>), BundleError> {
     let tensor = tensors.tensor(name).map_err(|_| BundleError::Missing(name.into()))?;
-    if tensor.dtype() != Dtype::F32 {
-        let (tensor, found) = (name.into(), format!("{:?}", tensor.dtype()));
-        return Err(BundleError::Tensor { tensor, expected: "float32", found });
-    }
-    let words = tensor.data().chunks_exact(4);
-    let values = words.map(|word| f32::from_le_bytes(word.try_into().expect("four bytes")));
-    Ok((tensor.shape().to_vec(), values.collect()))
+    let values = match tensor.dtype() {
+        Dtype::F32 => numbers(tensor.data(), f32::from_le_bytes),
+        Dtype::F16 => numbers(tensor.data(), |word| f16::from_le_bytes(word).to_f32()),
+        other => {
+            let (tensor, found) = (name.into(), format!("{other:?}"));
+            return Err(BundleError::Tensor { tensor, expected: "float32 or float16", found });
+        }
+    };
+    Ok((tensor.shape().to_vec(), values))
+}
+
+fn numbers<const N: usize>(bytes: &[u8], read: impl Fn([u8; N]) -> f32) -> Vec<f32> {
+    bytes.chunks_exact(N).map(|word| read(word.try_into().expect("N bytes"))).collect()
 }
 
 #[cfg(test)]
@@ -260,21 +329,103 @@ mod tests {
     fn with_header(change: impl FnOnce(&mut Header)) -> Vec<u8> {
         let mut bundle = bundle();
         change(&mut bundle.header);
-        bundle.to_bytes().unwrap()
+        bundle.to_bytes(Precision::Single).unwrap()
     }
 
     #[test]
     fn a_round_trip_changes_nothing() {
         let bundle = bundle();
-        let bytes = bundle.to_bytes().unwrap();
-        assert_eq!(bytes, bundle.to_bytes().unwrap(), "the same bytes every time");
+        let bytes = bundle.to_bytes(Precision::Single).unwrap();
+        assert_eq!(bytes, bundle.to_bytes(Precision::Single).unwrap(), "the same bytes every time");
         let back = Bundle::from_bytes(&bytes).unwrap();
         assert_eq!(back, bundle);
-        assert_eq!(back.to_bytes().unwrap(), bytes);
+        assert_eq!(back.to_bytes(Precision::Single).unwrap(), bytes);
         let (x, mut a, mut b) = (numbers(19, 3), vec![0.0; 11], vec![0.0; 11]);
         bundle.network().predict(&x, 0.3, &mut a, &mut bundle.network().scratch());
         back.network().predict(&x, 0.3, &mut b, &mut back.network().scratch());
         assert_eq!(a, b);
+    }
+
+    #[test]
+    fn half_precision_halves_the_file_and_rounds_once() {
+        let bundle = Bundle::new(header(19, 11), network(&[19, 64, 64, 11])).unwrap();
+        let single = bundle.to_bytes(Precision::Single).unwrap();
+        let half = bundle.to_bytes(Precision::Half).unwrap();
+        assert!(half.len() < 6 * single.len() / 10, "{} of {}", half.len(), single.len());
+        let back = Bundle::from_bytes(&half).unwrap();
+        assert_eq!([bundle.precision(), back.precision()], [Precision::Single, Precision::Half]);
+        assert_eq!(back.header(), bundle.header());
+        assert_eq!(back.network().normalisation(), bundle.network().normalisation());
+        for (a, b) in bundle.network().layers().iter().zip(back.network().layers()) {
+            for (a, b) in a.weights().iter().zip(b.weights()) {
+                // Half a unit in the last of 11 places; below 2⁻¹⁴ steps are even.
+                assert!((a - b).abs() <= a.abs().max(6.2e-5) * 0.000_489, "{a} became {b}");
+            }
+        }
+        assert_eq!(back.to_bytes(Precision::Half).unwrap(), half, "rounded already");
+        let again = Bundle::from_bytes(&back.to_bytes(Precision::Single).unwrap()).unwrap();
+        assert_eq!(again.network(), back.network(), "single precision holds every half");
+        let (x, mut a, mut b) = (numbers(19, 3), vec![0.0; 11], vec![0.0; 11]);
+        bundle.network().predict(&x, 0.3, &mut a, &mut bundle.network().scratch());
+        back.network().predict(&x, 0.3, &mut b, &mut back.network().scratch());
+        for (i, std) in bundle.network().normalisation().output_std.iter().enumerate() {
+            assert!((a[i] - b[i]).abs() < 0.02 * std && a != b, "{} {}", a[i], b[i]);
+        }
+    }
+
+    #[test]
+    fn weights_beyond_half_precision_are_refused_by_name() {
+        let small = network(&[3, 2]);
+        let layer = |bias: f32| Layer::new(0, 3, 2, &[0.5; 24], &[bias; 8]).unwrap();
+        let bundle = |bias: f32| {
+            let network = Network::new(vec![layer(bias)], small.normalisation().clone()).unwrap();
+            Bundle::new(header(3, 2), network).unwrap()
+        };
+        // The largest half is 65504; up to 65520 numbers are rounded to it.
+        assert!(bundle(65_519.0).to_bytes(Precision::Half).is_ok());
+        let error = bundle(-65_520.0).to_bytes(Precision::Half).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "tensor 'layers.0.bias': number 0 is -65520, beyond half precision (65504): write it \
+             in single precision"
+        );
+        assert!(bundle(-65_520.0).to_bytes(Precision::Single).is_ok());
+    }
+
+    /// Precision is each tensor's own: another tool may round what it likes.
+    #[test]
+    fn any_tensor_may_be_half() {
+        let bundle = bundle();
+        let single = bundle.to_bytes(Precision::Single).unwrap();
+        let (_, metadata) = SafeTensors::read_metadata(&single).unwrap();
+        let tensors = SafeTensors::deserialize(&single).unwrap();
+        let rewritten = |only: &str, dtype: Dtype| {
+            let stored: Vec<_> = tensors
+                .iter()
+                .map(|(name, tensor)| {
+                    let values = super::numbers(tensor.data(), f32::from_le_bytes);
+                    let half = if name == only { Precision::Half } else { Precision::Single };
+                    let shape = tensor.shape().to_vec();
+                    let mut stored = Stored::new(name.into(), shape, &values, half).unwrap();
+                    if name == only && dtype != Dtype::F16 {
+                        stored.dtype = dtype;
+                    }
+                    stored
+                })
+                .collect();
+            let views = stored
+                .iter()
+                .map(|t| (&t.name, TensorView::new(t.dtype, t.shape.clone(), &t.bytes).unwrap()));
+            let bytes = safetensors::serialize(views, metadata.metadata().clone()).unwrap();
+            Bundle::from_bytes(&bytes)
+        };
+        let mixed = rewritten("layers.1.weight", Dtype::F16).unwrap();
+        assert_eq!(mixed.precision(), Precision::Single);
+        assert_eq!(mixed.network().layers()[0], bundle.network().layers()[0]);
+        assert_ne!(mixed.network().layers()[1], bundle.network().layers()[1]);
+        rewritten("output.std", Dtype::F16).unwrap();
+        let other = rewritten("layers.1.weight", Dtype::BF16).unwrap_err().to_string();
+        assert_eq!(other, "tensor 'layers.1.weight': expected float32 or float16, got BF16");
     }
 
     #[test]
@@ -293,10 +444,10 @@ mod tests {
         let foreign = safetensors::serialize(Vec::<(&str, TensorView)>::new(), None).unwrap();
         assert!(message(&foreign).contains("not an Ambulo bundle"));
         assert!(message(b"").contains("not a safetensors file"));
-        let mut cut = bundle().to_bytes().unwrap();
+        let mut cut = bundle().to_bytes(Precision::Single).unwrap();
         cut.pop();
         assert!(message(&cut).contains("not a safetensors file"));
-        let mut nan = bundle().to_bytes().unwrap();
+        let mut nan = bundle().to_bytes(Precision::Single).unwrap();
         let end = nan.len();
         nan[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
         assert!(message(&nan).contains("expected a finite number"), "{}", message(&nan));
@@ -304,7 +455,7 @@ mod tests {
 
     #[test]
     fn refuses_tensors_that_are_missing_or_too_many() {
-        let bytes = bundle().to_bytes().unwrap();
+        let bytes = bundle().to_bytes(Precision::Single).unwrap();
         let renamed = |from: &str, to: &str| {
             assert_eq!(from.len(), to.len());
             let at = bytes.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
@@ -329,8 +480,11 @@ mod tests {
         }
 
         #[test]
-        fn never_panics_on_nearly_right_bytes(at in 0usize..3000, byte in any::<u8>()) {
-            let mut bytes = bundle().to_bytes().unwrap();
+        fn never_panics_on_nearly_right_bytes(
+            at in 0usize..3000, byte in any::<u8>(), half in any::<bool>(),
+        ) {
+            let precision = if half { Precision::Half } else { Precision::Single };
+            let mut bytes = bundle().to_bytes(precision).unwrap();
             let at = at % bytes.len();
             bytes[at] = byte;
             if let Ok(read) = Bundle::from_bytes(&bytes) {

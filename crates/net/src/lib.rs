@@ -13,6 +13,6 @@ mod kernel;
 mod network;
 mod phase;
 
-pub use bundle::{Bundle, BundleError, FORMAT_VERSION, Header, LayoutTable};
+pub use bundle::{Bundle, BundleError, FORMAT_VERSION, Header, LayoutTable, Precision};
 pub use network::{Layer, Network, NetworkError, Normalisation, Scratch};
 pub use phase::{CONTROL_POINTS, control_weights, spline_shares};

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ambulo.cli.character import demo, import_, model, walk
+from ambulo.cli.dataset import dataset
 from ambulo.cli.motion import motion
 from ambulo.cli.stopping import STOPPED
 
@@ -69,7 +70,7 @@ def completion(shell: str) -> None:
     click.echo(found(cli, {}, "ambulo", "_AMBULO_COMPLETE").source())
 
 
-for command in (demo, import_, model, motion, walk):
+for command in (dataset, demo, import_, model, motion, walk):
     cli.add_command(command)
 
 

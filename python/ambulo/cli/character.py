@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -85,14 +86,14 @@ def import_holden_(
 
 @click.group()
 def model() -> None:
-    """Look at models."""
+    """Look at models, and make their files smaller."""
 
 
 @model.command(name="info")
 @click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 def model_info(path: Path, as_json: bool) -> None:
-    """Say what MODEL is: its network, layout, licence and origin.
+    """Say what MODEL is: its network, size, layout, tuning, licence and origin.
 
     \b
     Example:
@@ -102,12 +103,59 @@ def model_info(path: Path, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(info, indent=2))
         return
-    for key, value in info.items():
-        if isinstance(value, dict):
-            for inner, text in value.items():
-                click.echo(f"{inner:>12}  {text}")
-        else:
-            click.echo(f"{key:>12}  {value}")
+    tuning, provenance = info.pop("tuning"), info.pop("provenance")
+    info["bytes"] = f"{info['bytes']:,}"
+    info["tuning"] = ", ".join(f"{key} {value}" for key, value in tuning.items()) or "published"
+    for key, value in {**info, **provenance}.items():
+        click.echo(f"{key:>12}  {value}")
+
+
+@model.command(name="half")
+@click.argument("path", metavar="MODEL", type=click.Path(exists=True, path_type=Path))
+@click.option(
+    "-o", "--output", required=True, type=click.Path(dir_okay=False, path_type=Path),
+    help="The model to write (.safetensors).",
+)  # fmt: skip
+@click.option("--overwrite", is_flag=True, help="Replace OUTPUT if it exists.")
+@click.option("--dry-run", is_flag=True, help="Check and measure, write nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+def model_half(path: Path, output: Path, overwrite: bool, dry_run: bool, as_json: bool) -> None:
+    """Write MODEL with its layers in half precision: half the size.
+
+    Says by how much that changes its answers: the largest difference in 64 random inputs, as a
+    share of each number's deviation.
+
+    \b
+    Example:
+      ambulo model half model.safetensors -o small.safetensors
+    """
+    _may_write(output, overwrite)
+    whole = load_model(path)
+    data = whole.to_bytes(half=True)
+    report = {
+        "output": None if dry_run else str(output),
+        "bytes_before": whole.info()["bytes"],
+        "bytes": len(data),
+        "largest_change_sd": _largest_change(whole, Model.from_bytes(data)),
+    }
+    if not dry_run:
+        write_atomic(output, data)
+    if as_json:
+        click.echo(json.dumps(report, indent=2))
+        return
+    before, after = report["bytes_before"], report["bytes"]
+    click.echo(f"{before / 1e6:.2f} MB before, {after / 1e6:.2f} MB in half precision")
+    click.echo(f"largest change of an answer: {report['largest_change_sd']:.1e} deviations")
+    click.echo("dry run: nothing written" if dry_run else f"wrote {output}")
+
+
+def _largest_change(a: Model, b: Model) -> float:
+    """Of two models of one shape: over random inputs, in deviations of the outputs."""
+    n, rng = a.core.normalisation(), np.random.default_rng(0)
+    x = n["input_mean"] + n["input_std"] * rng.standard_normal((64, a.inputs))
+    phase = rng.uniform(0.0, 2.0 * np.pi, 64)
+    change = np.abs(a.predict(x, phase) - b.predict(x, phase)) / n["output_std"]
+    return float(change.max())
 
 
 @click.command()

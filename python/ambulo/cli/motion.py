@@ -61,7 +61,7 @@ def info(ctx: click.Context, path: Path, repair: bool, as_json: bool) -> None:
       ambulo motion info walk.bvh
       ambulo motion info captures/ --json
     """
-    inputs = list(_motion_files(path))
+    inputs = list(motion_files(path))
 
     def look(outcome: Outcome) -> None:
         _, outcome.report = _core.read_motion(str(outcome.input), repair=repair)
@@ -156,7 +156,7 @@ def convert(
 # -- files ------------------------------------------------------------------------------------
 
 
-def _motion_files(path: Path) -> Iterator[Path]:
+def motion_files(path: Path) -> Iterator[Path]:
     """Give the file itself, or every motion file below the folder, in order."""
     if path.is_file():
         yield path
@@ -179,7 +179,7 @@ def _planned(source: Path, target: Path) -> list[Outcome]:
     if source.is_dir():
         if target.is_file():
             raise click.UsageError(f"{source} is a folder, but {target} is a file")
-        files = _motion_files(source)
+        files = motion_files(source)
         return [Outcome(f, (target / f.relative_to(source)).with_suffix(".bvh")) for f in files]
     _refuse_special(source)
     if target.is_dir():

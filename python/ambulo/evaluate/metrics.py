@@ -35,11 +35,38 @@ def foot_skate(recording: Recording, terrain: Heights, joints: list[int], floor:
     horizontal displacement per 1/60 s and h its height above the ground, less its `floor` (metres,
     one a foot); below that h counts as 0. The mean is over frames and feet.
     """
-    h = np.clip(_above_ground(recording, terrain, joints) - floor, 0.0, None)[1:]
-    step = np.diff(recording.positions[:, joints][..., [0, 2]].astype(float), axis=0)
-    v = np.hypot(step[..., 0], step[..., 1]) * recording.fps / 60.0
+    above = _above_ground(recording, terrain, joints) - floor
+    return float(skate(recording.positions[:, joints], above, recording.fps).mean())
+
+
+def skate(feet: Array, above: Array, fps: float) -> Array:
+    """(T − 1, feet) foot skate in centimetres per 60 Hz frame, as `foot_skate` defines it.
+
+    `feet` (T, feet, 3) are places in the world, `above` (T, feet) heights over the floor; metres.
+    """
+    h = np.clip(above, 0.0, None)[1:]
+    step = np.diff(feet[..., [0, 2]].astype(float), axis=0)
+    v = np.hypot(step[..., 0], step[..., 1]) * fps / 60.0
     weight = np.clip(2.0 - 2.0 ** (h / SKATE_HEIGHT), 0.0, None)
-    return float((v * weight).mean() * 100.0)
+    return v * weight * 100.0
+
+
+def jerk(positions: Array, fps: float) -> Array:
+    """(T − 3,) mean over joints of the third difference of places (T, J, 3), metres / s³."""
+    third = np.diff(positions.astype(float), 3, axis=0)
+    return np.linalg.norm(third, axis=-1).mean(axis=-1) * fps**3
+
+
+def sway(places: Array, fps: float, window: float = 2.0) -> Array:
+    """(windows,) how far a point (T, 3) moves about its mean in windows of `window` seconds.
+
+    The root of the summed variances of x, y and z, metres; windows start every half window and
+    there are none where the motion is shorter.
+    """
+    length = round(window * fps)
+    starts = range(0, len(places) - length + 1, max(length // 2, 1))
+    spreads = [places[i : i + length].astype(float).var(axis=0).sum() ** 0.5 for i in starts]
+    return np.array(spreads)
 
 
 def _above_ground(recording: Recording, terrain: Heights, joints: list[int]) -> Array:

@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NoReturn
 
-GAITS = ("walk", "jog", "crouch")
+GAITS = ("walk", "jog", "crouch", "run", "auto")
 # A published speed of 1 means a centimetre per 60 Hz frame.
 UNITS = {"m_per_s": 1.0, "cm_per_frame": 0.6}
 # Metres a second: below the first a character stands, and above the second nobody runs.

@@ -77,7 +77,7 @@ def walk_laps(
     """Walk a character around a track, lap after lap.
 
     Args:
-        model: with the `holden` layout.
+        model: of either layout.
         track: the course.
         terrain: what it walks on.
         laps: how many, ≥ 1.

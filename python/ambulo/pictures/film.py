@@ -245,12 +245,16 @@ def _pose(stage: Stage, frames: Floats, frame: float, cell: tuple[int, int]) -> 
     heading = float(np.arctan2(travel[0], travel[1]))
     if np.hypot(*travel) < 0.3 * stature:
         heading = float(between(np.unwrap(recording.facing), np.array([frame]))[0])
-    x, z = between(recording.root, np.array([frame]))[0]
+    # Four legs go before and behind the hips, which is where the root is.
+    human = stage.mannequin.human
+    middle = recording.root if human else recording.positions.mean(axis=1)[:, [0, 2]]
+    x, z = between(middle, np.array([frame]))[0]
     y = float(stage.terrain.height(np.array([x]), np.array([z]))[0])
     yaw = heading + 0.5 * np.pi  # then the picture's right is the heading
     forward = np.array([np.sin(yaw), 0.0, np.cos(yaw)])
     distance, rise = 5.0 * stature, 0.95 * stature
-    focal = 0.72 * cell[1] * distance / stature  # a long lens: no pose is seen from aside
+    size = 0.72 * cell[1] if human else min(0.72 * cell[1], 0.9 * cell[0])
+    focal = size * distance / stature  # a long lens: no pose is seen from aside
     eye = np.array([x, y + rise, z]) - distance * forward
     feet = 0.845 * cell[1]
     camera = Camera(eye, yaw, focal, feet - focal * rise / distance, cell)

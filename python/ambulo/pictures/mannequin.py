@@ -114,9 +114,9 @@ class Mannequin:
         self.marks = landmarks(recording.names)
         self.terrain = terrain
         wanted = [f"{side} {mark}" for side in ("left", "right") for mark in REQUIRED] + ["head"]
-        self.human = all(mark in self.marks for mark in wanted)
         sample = np.linspace(0, recording.frames - 1, min(recording.frames, 200)).astype(int)
         positions = np.asarray(recording.positions, np.float64)[sample]
+        self.human = all(mark in self.marks for mark in wanted) and self._upright(positions)
         self.lengths = self._bone_lengths(positions)
         self.spine = self._spine_chain() if self.human else []
         self.stature = self._stature(positions)
@@ -136,6 +136,15 @@ class Mannequin:
         else:
             self._plain(heap, joints, tips)
         return heap.cones()
+
+    def _upright(self, positions: Array) -> bool:
+        """Whether the trunk stands more than it lies: captured dogs have arms by name, too."""
+        arms = (
+            positions[:, self.marks["left shoulder"]] + positions[:, self.marks["right shoulder"]]
+        )
+        trunk = arms - positions[:, self.marks["left hip"]] - positions[:, self.marks["right hip"]]
+        level = np.linalg.norm(trunk[:, [0, 2]], axis=-1)
+        return bool(np.median(trunk[:, 1] - level) > 0.0)
 
     # Measuring ------------------------------------------------------------------------------
 

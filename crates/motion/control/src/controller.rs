@@ -126,6 +126,7 @@ pub struct Controller {
 
 impl Controller {
     /// A character that stands at a place (x, z) and faces a yaw, in the network's mean pose.
+    /// [`Model::tuning`] is the tuning that the bundle asks for.
     ///
     /// # Errors
     /// A tuning or a start with numbers that cannot be used.
@@ -165,11 +166,12 @@ impl Controller {
             y,
             scratch: model.network().scratch(),
             global: vec![Transform::IDENTITY; joints],
-            legs: model.feet().ankles().map(|foot| Leg::above(model.skeleton(), foot)),
+            legs: [None; 2],
             model,
         };
         controller.y.copy_from_slice(&controller.model.network().normalisation().output_mean);
         controller.model.layout().decode_output(&controller.y, &mut controller.output);
+        controller.find_legs();
         controller.take_pose(1.0);
         controller.show(world);
         // The mean pose is nobody's stance: no foot is held in it.
@@ -245,11 +247,19 @@ impl Controller {
         }
         self.take_pose(share(self.tuning.pose_halflife, dt));
         self.show(world);
-        let freedom = self.next.trajectory.freedom();
+        let freedom = self.next.trajectory.freedom(&self.tuning);
         let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
         self.next.phase = (self.next.phase + TAU * cycles).rem_euclid(TAU);
-        self.next.trajectory.advance(&self.output, world.areas, dt);
+        self.next.trajectory.advance(&self.output, &self.tuning, world.areas, dt);
         if self.next.is_finite() { Ok(()) } else { Err(Held::Network) }
+    }
+
+    /// Legs bend the way that the mean pose does: knees never bend backward, so their mean is bent.
+    fn find_legs(&mut self) {
+        let drawn = self.output.joint_position.iter().zip(&self.output.joint_rotation);
+        let mean: Vec<_> = drawn.map(|(&p, &r)| Transform::new(p, r)).collect();
+        let skeleton = self.model.skeleton();
+        self.legs = self.model.feet().ankles().map(|foot| Leg::above(skeleton, foot, &mean));
     }
 
     /// Fills the network's input from the state that is tried out.

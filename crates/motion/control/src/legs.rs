@@ -9,16 +9,26 @@ pub struct Leg {
     upper: usize,
     lower: usize,
     foot: usize,
+    /// What a straight leg bends about, in the frame of the lower joint.
+    hinge: Vec3,
 }
 
 impl Leg {
-    /// The two bones above a foot; `None` where it has no two.
-    pub fn above(skeleton: &Skeleton, foot: usize) -> Option<Self> {
+    /// The two bones above a foot; `None` where it has no two. `bent` has the transforms, in the
+    /// root's frame, of a pose in which the leg is bent the way it can: knees forward, hocks back.
+    /// (Skeletons agree on no axis of the joint's own frame that would tell.)
+    pub fn above(skeleton: &Skeleton, foot: usize, bent: &[Transform]) -> Option<Self> {
         let lower = skeleton.joints()[foot].parent?;
         let upper = skeleton.joints()[lower].parent?;
         // The root is not a leg's bone: turning it would turn everything.
         skeleton.joints()[upper].parent?;
-        Some(Self { upper, lower, foot })
+        let [a, b, c] = [upper, lower, foot].map(|joint| bent[joint].translation.as_dvec3());
+        let across = (c - a).cross(b - a);
+        // Bends of less than a degree tell nothing; people's knees bend about their right.
+        let clear = across.length() > 0.01 * (c - a).length() * (b - a).length();
+        let axis = if clear { across.normalize().as_vec3() } else { Vec3::NEG_X };
+        let hinge = bent[lower].rotation.inverse() * axis;
+        Some(Self { upper, lower, foot, hinge })
     }
 
     /// Bends the leg so that its foot comes to `ankle`, or as near as it can; the foot keeps its
@@ -33,7 +43,7 @@ impl Leg {
     ) {
         let place = |joint: usize| global[joint].translation;
         let (hip, knee, foot) = (place(self.upper), place(self.lower), place(self.foot));
-        let hinge = global[self.lower].rotation * Vec3::NEG_X;
+        let hinge = global[self.lower].rotation * self.hinge;
         let [upper, lower] = two_bone(hip, knee, foot, ankle, hinge);
         global[self.upper].rotation = (upper * global[self.upper].rotation).normalize();
         global[self.lower].rotation = (lower * global[self.lower].rotation).normalize();
@@ -94,16 +104,39 @@ mod tests {
             joint("foot", Some(2), -0.42),
         ])
         .unwrap();
-        let leg = Leg::above(&skeleton, 3).unwrap();
+        let leg = Leg::above(&skeleton, 3, &[Transform::IDENTITY; 4]).unwrap();
         (skeleton, leg)
     }
 
     #[test]
     fn only_feet_with_two_bones_below_the_root_have_legs() {
         let (skeleton, leg) = leg();
-        assert_eq!(leg, Leg { upper: 1, lower: 2, foot: 3 });
-        assert_eq!(Leg::above(&skeleton, 2), None);
-        assert_eq!(Leg::above(&skeleton, 0), None);
+        assert_eq!(leg, Leg { upper: 1, lower: 2, foot: 3, hinge: Vec3::NEG_X });
+        let pose = [Transform::IDENTITY; 4];
+        assert_eq!(Leg::above(&skeleton, 2, &pose), None);
+        assert_eq!(Leg::above(&skeleton, 0, &pose), None);
+    }
+
+    /// A hind leg whose hock bends backward, on a skeleton whose joints' frames lie anyhow.
+    #[test]
+    fn a_straight_leg_bends_the_way_it_was_drawn() {
+        let (skeleton, _) = leg();
+        let turned = Quat::from_rotation_y(1.3) * Quat::from_rotation_z(0.4);
+        for back in [-0.1, 0.1] {
+            let at = [Vec3::Y, Vec3::new(0.0, 0.9, 0.0), Vec3::new(0.0, 0.5, back), Vec3::ZERO];
+            let bent = at.map(|place| Transform::new(place, turned));
+            let leg = Leg::above(&skeleton, 3, &bent).unwrap();
+            let mut pose = skeleton.rest_pose();
+            let mut global = vec![Transform::IDENTITY; 4];
+            pose.to_global(&skeleton, &mut global);
+            // Straight down, in frames that lie as they did in the bent pose.
+            global[1..].iter_mut().for_each(|joint| joint.rotation = turned);
+            leg.reach(&skeleton, Vec3::new(0.0, 0.25, 0.0), &mut pose, &mut global);
+            // Where the knee went, from the turn of the upper bone.
+            let knee = global[1].translation
+                + global[1].rotation * turned.inverse() * Vec3::new(0.0, -0.4, 0.0);
+            assert!(knee.z * back > 0.01, "{back}: {knee}");
+        }
     }
 
     #[test]

@@ -9,6 +9,8 @@ use ambulo_rig::glam::Vec3;
 use ambulo_rig::{Pose, Skeleton, Transform};
 use serde::{Deserialize, Serialize};
 
+use crate::Tuning;
+
 /// Metres; more is a skeleton in another unit.
 const LONGEST_BONE: f64 = 10.0;
 
@@ -54,6 +56,7 @@ pub struct Model {
     layout: Layout,
     skeleton: Arc<Skeleton>,
     feet: Feet,
+    tuning: Tuning,
 }
 
 impl Model {
@@ -67,12 +70,16 @@ impl Model {
         fn read<T: for<'a> Deserialize<'a>>(
             bundle: &Bundle,
             part: &'static str,
-        ) -> Result<T, ControlError> {
-            let value = bundle.header().parts.get(part).ok_or(ControlError::Missing(part))?;
-            T::deserialize(value).map_err(|e| ControlError::Broken { part, reason: e.to_string() })
+        ) -> Result<Option<T>, ControlError> {
+            let value = bundle.header().parts.get(part);
+            let broken =
+                |e: serde_json::Error| ControlError::Broken { part, reason: e.to_string() };
+            value.map(T::deserialize).transpose().map_err(broken)
         }
-        let skeleton: Skeleton = read(&bundle, "skeleton")?;
-        let feet: Feet = read(&bundle, "feet")?;
+        let missing = ControlError::Missing;
+        let skeleton: Skeleton = read(&bundle, "skeleton")?.ok_or(missing("skeleton"))?;
+        let feet: Feet = read(&bundle, "feet")?.ok_or(missing("feet"))?;
+        let tuning: Tuning = read(&bundle, "tuning")?.unwrap_or_default();
         let table = &header.layout;
         let layout = Layout::named(&table.name, skeleton.len())?;
         layout.check(&table.inputs, &table.outputs, &table.hash)?;
@@ -92,7 +99,10 @@ impl Model {
         {
             return broken("feet", "a height of a metre or more");
         }
-        Ok(Self { layout, skeleton: Arc::new(skeleton), feet, bundle: bundle.clone() })
+        if !tuning.is_valid() {
+            return broken("tuning", "a number that is out of range");
+        }
+        Ok(Self { layout, skeleton: Arc::new(skeleton), feet, tuning, bundle: bundle.clone() })
     }
 
     /// The bundle as it was loaded.
@@ -138,6 +148,11 @@ impl Model {
             }
         }
         offsets
+    }
+
+    /// What the bundle says that it moves best with; the published one where it says nothing.
+    pub fn tuning(&self) -> Tuning {
+        self.tuning
     }
 
     /// Heels and toes.

@@ -18,6 +18,10 @@ const STRIDE: usize = WINDOW_POINTS / SAMPLES;
 /// Distance of the side samples of the ground from the path.
 const SIDE: f32 = 0.25;
 
+// Metres a second between which `Gait::Auto` goes from walking to jogging, and on to running.
+const TO_JOG: [f32; 2] = [1.9, 2.3];
+const TO_RUN: [f32; 2] = [3.6, 4.2];
+
 /// Below this asked speed (metres a second; 0.1 cm a frame at 60 Hz) a character stands.
 const STANDING: f32 = 0.06;
 
@@ -25,6 +29,7 @@ const STANDING: f32 = 0.06;
 const STAND: usize = 0;
 const WALK: usize = 1;
 const JOG: usize = 2;
+const RUN: usize = 3;
 const CROUCH: usize = 4;
 const JUMP: usize = 5;
 
@@ -91,6 +96,45 @@ pub struct Trajectory {
     facing: Vec2,
     strafe: f32,
     crouch: f32,
+    /// Of the last step, metres a second.
+    moved: Vec2,
+    speed: SpeedGain,
+}
+
+/// A clamped integrator that makes up for a network which moves slower or faster than its
+/// trajectory asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct SpeedGain {
+    /// On the asked velocity.
+    factor: f32,
+    /// Asked one step ago: what the last step could answer to.
+    told: Vec2,
+    /// Velocities, metres a second, smoothed alike so that a start is not taken for a lag.
+    asked: Vec2,
+    reached: Vec2,
+}
+
+impl SpeedGain {
+    const STANDING: Self =
+        Self { factor: 1.0, told: Vec2::ZERO, asked: Vec2::ZERO, reached: Vec2::ZERO };
+
+    fn follow(&mut self, asked: Vec2, moved: Vec2, tuning: &Tuning, dt: f32) {
+        // Four times quicker than the integrator: the loop of both is critically damped.
+        let smooth = share(tuning.speed_halflife / 4.0, dt);
+        self.asked = self.asked.lerp(self.told, smooth);
+        self.told = asked;
+        self.reached = self.reached.lerp(moved, smooth);
+        let speed = self.asked.length();
+        if asked.length() < STANDING || speed < STANDING {
+            self.factor = 1.0;
+            return;
+        }
+        // In a steady turn the movement trails the wish; that is no lack of speed.
+        let along = self.reached.dot(self.asked) > 0.0;
+        let lag = 1.0 - if along { self.reached.length() / speed } else { 0.0 };
+        let [least, most] = tuning.speed_limit;
+        self.factor = (self.factor + lag * share(tuning.speed_halflife, dt)).clamp(least, most);
+    }
 }
 
 impl Trajectory {
@@ -102,7 +146,15 @@ impl Trajectory {
         let position = Vec3::new(place.x, height, place.y);
         let point = TrajectoryPoint { position, direction: facing, gait, height };
         let points = [point; WINDOW_POINTS];
-        Self { points, velocity: Vec2::ZERO, facing, strafe: 0.0, crouch: 0.0 }
+        Self {
+            points,
+            velocity: Vec2::ZERO,
+            facing,
+            strafe: 0.0,
+            crouch: 0.0,
+            moved: Vec2::ZERO,
+            speed: SpeedGain::STANDING,
+        }
     }
 
     pub fn points(&self) -> &[TrajectoryPoint; WINDOW_POINTS] {
@@ -121,6 +173,7 @@ impl Trajectory {
     /// Follows an intent by one step of `dt`: smooths the wishes, sets the gait, bends the future.
     pub fn follow(&mut self, intent: &Intent, tuning: &Tuning, world: &World<'_>, dt: f32) {
         self.smooth(intent, tuning, dt);
+        self.speed.follow(self.velocity, self.moved, tuning, dt);
         self.set_gait(intent.gait, share(tuning.gait_halflife, dt));
         self.bend_future(tuning, world.areas, dt);
         self.enter_areas(world.areas);
@@ -146,10 +199,8 @@ impl Trajectory {
             goal[STAND] = 1.0 - speed / STANDING;
         } else if self.crouch > 0.1 {
             goal[CROUCH] = self.crouch;
-        } else if gait == Gait::Jog {
-            goal[JOG] = 1.0;
         } else {
-            goal[WALK] = 1.0;
+            [goal[WALK], goal[JOG], goal[RUN]] = paces(gait, speed);
         }
         for (value, goal) in self.points[NOW].gait.iter_mut().zip(goal) {
             *value += (goal - *value) * share;
@@ -160,7 +211,8 @@ impl Trajectory {
     fn bend_future(&mut self, tuning: &Tuning, areas: &Areas, dt: f32) {
         let mix = |[plain, strafing]: [f32; 2]| plain + (strafing - plain) * self.strafe;
         let (position_bias, facing_bias) = (mix(tuning.position_bias), mix(tuning.facing_bias));
-        let (velocity, facing, gait) = (self.velocity * dt, self.facing, self.points[NOW].gait);
+        let velocity = self.velocity * (self.speed.factor * dt);
+        let (facing, gait) = (self.facing, self.points[NOW].gait);
         let mut foreseen = self.points[NOW].ground();
         for index in NOW + 1..WINDOW_POINTS {
             let t = (index - NOW) as f32 / WINDOW as f32;
@@ -221,19 +273,22 @@ impl Trajectory {
         }
     }
 
-    /// How much the character is not standing, 0 to 1: what roots may turn and move by.
-    pub fn freedom(&self) -> f32 {
-        (1.0 - self.now().gait[STAND]).clamp(0.0, 1.0).powf(0.25)
+    /// What roots may turn and move by, 0 to 1: nothing while standing, unless the tuning lets them.
+    pub fn freedom(&self, tuning: &Tuning) -> f32 {
+        let published = (1.0 - self.now().gait[STAND]).clamp(0.0, 1.0).powf(0.25);
+        published + (1.0 - published) * tuning.stand_freedom
     }
 
     /// Moves on by one step: the past shifts, the root goes where the network sends it, and the
     /// future becomes what the network foresees.
-    pub fn advance(&mut self, output: &Output, areas: &Areas, dt: f32) {
-        let freedom = self.freedom();
+    pub fn advance(&mut self, output: &Output, tuning: &Tuning, areas: &Areas, dt: f32) {
+        let freedom = self.freedom(tuning);
         self.points.copy_within(1..=NOW, 0);
         let now = &mut self.points[NOW];
         let moved = now.ground() + now.outward(output.root_velocity * (dt * freedom));
+        let before = now.ground();
         now.set_ground(areas.keep_out(moved));
+        self.moved = (now.ground() - before) / dt;
         let turned = yaw(now.direction) + output.yaw_rate * dt * freedom;
         now.direction = Vec2::new(turned.sin(), turned.cos());
         let now = *now;
@@ -253,7 +308,25 @@ impl Trajectory {
     pub fn is_finite(&self) -> bool {
         let points = self.points.iter();
         let mut finite = points.map(|p| p.position.is_finite() && p.direction.is_finite());
-        finite.all(|finite| finite) && self.velocity.is_finite() && self.facing.is_finite()
+        finite.all(|finite| finite)
+            && self.velocity.is_finite()
+            && self.facing.is_finite()
+            && self.moved.is_finite()
+            && self.speed.reached.is_finite()
+    }
+}
+
+/// Shares of walking, jogging and running at a speed in metres a second.
+fn paces(gait: Gait, speed: f32) -> [f32; 3] {
+    let past = |[from, to]: [f32; 2]| ((speed - from) / (to - from)).clamp(0.0, 1.0);
+    match gait {
+        Gait::Walk | Gait::Crouch => [1.0, 0.0, 0.0],
+        Gait::Jog => [0.0, 1.0, 0.0],
+        Gait::Run => [0.0, 0.0, 1.0],
+        Gait::Auto => {
+            let (jog, run) = (past(TO_JOG), past(TO_RUN));
+            [1.0 - jog, jog - run, run]
+        }
     }
 }
 
@@ -329,6 +402,11 @@ mod tests {
         for (gait, speed, expected) in [
             (Gait::Walk, 1.0, WALK),
             (Gait::Jog, 1.0, JOG),
+            (Gait::Run, 1.0, RUN),
+            (Gait::Auto, 1.5, WALK),
+            (Gait::Auto, 3.0, JOG),
+            (Gait::Auto, 5.0, RUN),
+            (Gait::Auto, 0.0, STAND),
             (Gait::Crouch, 1.0, CROUCH),
             (Gait::Jog, 0.0, STAND),
         ] {
@@ -341,6 +419,75 @@ mod tests {
                 let wanted = if index == expected { 1.0 } else { 0.0 };
                 assert!((share - wanted).abs() < 1e-3, "{gait:?}: input {index} is {share}");
             }
+        }
+    }
+
+    #[test]
+    fn paces_meet_softly() {
+        let near = |speed, expected: [f32; 3]| {
+            let got = paces(Gait::Auto, speed);
+            let close = got.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
+            assert!(close, "{speed}: {got:?}");
+        };
+        near(1.9, [1.0, 0.0, 0.0]);
+        near(2.1, [0.5, 0.5, 0.0]);
+        near(2.3, [0.0, 1.0, 0.0]);
+        near(3.6, [0.0, 1.0, 0.0]);
+        near(3.75, [0.0, 0.75, 0.25]);
+        near(4.2, [0.0, 0.0, 1.0]);
+    }
+
+    /// A root that reaches a fixed share of the trajectory's speed ends at the asked one, whatever
+    /// the rate of the steps, within the limits and without them not at all.
+    #[test]
+    fn the_speed_that_is_asked_is_reached() {
+        let tuning = Tuning { speed_limit: [0.8, 1.3], ..Tuning::default() };
+        let reached = |tuning: &Tuning, ability: f32, rate: u32, seconds: f32| {
+            let (dt, asked) = (1.0 / rate as f32, Vec2::new(0.0, 2.0));
+            let (mut gain, mut moved, mut most) = (SpeedGain::STANDING, Vec2::ZERO, 0.0f32);
+            for _ in 0..(seconds * rate as f32) as usize {
+                gain.follow(asked, moved, tuning, dt);
+                moved = asked * gain.factor * ability;
+                most = most.max(moved.y / asked.y);
+            }
+            (moved.y / asked.y, most)
+        };
+        for ability in [0.85, 1.2] {
+            for rate in [30, 60, 144] {
+                let (late, most) = reached(&tuning, ability, rate, 10.0);
+                assert!((late - 1.0).abs() < 0.01, "{ability} at {rate}: {late}");
+                assert!(most < 1.05f32.max(1.01 * ability), "overshoots: {most}");
+            }
+            let at = |rate| reached(&tuning, ability, rate, 1.5).0;
+            assert!((at(30) - at(144)).abs() < 0.01, "{ability}: {} {}", at(30), at(144));
+            assert_eq!(reached(&Tuning::default(), ability, 60, 10.0).0, ability);
+        }
+        assert!((reached(&tuning, 0.5, 60, 30.0).0 - 0.65).abs() < 1e-3, "clamped");
+        // A movement that trails a turning wish by 30°, at its speed.
+        let (mut gain, way) = (SpeedGain::STANDING, |angle: f32| Vec2::from_angle(angle) * 1.5);
+        for step in 0..600 {
+            let angle = 1.57 * step as f32 * DT;
+            gain.follow(way(angle), way(angle - 0.52) * gain.factor, &tuning, DT);
+        }
+        assert!((gain.factor - 1.0).abs() < 0.02, "{}", gain.factor);
+        let mut gain = SpeedGain { factor: 1.2, ..SpeedGain::STANDING };
+        gain.follow(Vec2::ZERO, Vec2::Y, &tuning, DT);
+        assert_eq!(gain.factor, 1.0, "who stands starts anew");
+    }
+
+    #[test]
+    fn who_may_stand_freely_moves_as_foreseen() {
+        let areas = Areas::default();
+        let mut output = Output::zero(1);
+        output.root_velocity = Vec2::new(0.06, 0.0);
+        output.yaw_rate = 0.3;
+        for (stand_freedom, moved) in [(0.0, 0.0), (0.5, 0.0005), (1.0, 0.001)] {
+            let mut trajectory = standing(&areas);
+            let tuning = Tuning { stand_freedom, ..Tuning::default() };
+            trajectory.advance(&output, &tuning, &areas, DT);
+            let gone = trajectory.now().ground() - trajectory.before().ground();
+            assert!((gone.x - moved).abs() < 1e-6, "{stand_freedom}: {gone}");
+            assert!((yaw(trajectory.now().direction) - 5.0 * moved).abs() < 1e-6);
         }
     }
 
@@ -395,7 +542,7 @@ mod tests {
             *point = Point { position: Vec2::new(0.0, i as f32 * 0.2), direction: Vec2::Y };
         }
         let before = trajectory.now().ground();
-        trajectory.advance(&output, &areas, DT);
+        trajectory.advance(&output, &Tuning::default(), &areas, DT);
         assert_eq!(trajectory.before().ground(), before);
         let now = *trajectory.now();
         assert!((now.ground() - before).abs_diff_eq(Vec2::new(0.0, 0.02), 1e-4));

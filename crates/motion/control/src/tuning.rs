@@ -1,9 +1,15 @@
 //! How quickly a character follows.
 
+use serde::{Deserialize, Serialize};
+
 /// Time constants of a controller. Smoothing is given as half-lives in seconds, so that nothing
 /// depends on a frame rate; the defaults are those of the published demo, whose per-frame blends
 /// at 60 Hz they reproduce.
-#[derive(Clone, Copy, Debug, PartialEq)]
+///
+/// A bundle may carry the tuning that its network moves best with, as its part `tuning`: an object
+/// of these fields, of which those left out have the defaults.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Tuning {
     /// Of the asked velocity (published: 0.9 a frame).
     pub velocity_halflife: f32,
@@ -26,6 +32,15 @@ pub struct Tuning {
     pub position_bias: [f32; 2],
     /// The same for the facing.
     pub facing_bias: [f32; 2],
+    /// Of what is left between the asked and the reached speed, by which the speed that the
+    /// trajectory is given is raised or lowered; the speed reached is itself smoothed by a quarter
+    /// of it. Without effect while `speed_limit` is 1 to 1.
+    pub speed_halflife: f32,
+    /// Least and greatest factor on the asked speed; both 1 (as published): no such correction.
+    pub speed_limit: [f32; 2],
+    /// How freely a standing character moves its root and its phase: 0 (as published) stops both,
+    /// so that it freezes; 1 lets it breathe and shift its weight as its network foresees.
+    pub stand_freedom: f32,
 }
 
 impl Default for Tuning {
@@ -42,14 +57,19 @@ impl Default for Tuning {
             foot_halflife: 0.075,
             position_bias: [0.5, 1.0],
             facing_bias: [2.0, 0.5],
+            speed_halflife: 1.0,
+            speed_limit: [1.0, 1.0],
+            stand_freedom: 0.0,
         }
     }
 }
 
 impl Tuning {
-    /// The published demo's "responsive" setting: turns and starts sooner, slides a little more.
-    pub fn responsive() -> Self {
-        Self { position_bias: [2.0, 2.0], facing_bias: [5.0, 3.0], ..Self::default() }
+    /// The same with the published demo's "responsive" setting: turns and starts sooner, slides a
+    /// little more.
+    #[must_use]
+    pub fn responsive(self) -> Self {
+        Self { position_bias: [2.0, 2.0], facing_bias: [5.0, 3.0], ..self }
     }
 
     /// Whether every number can be used.
@@ -62,12 +82,19 @@ impl Tuning {
             self.gait_halflife,
             self.pose_halflife,
             self.foot_halflife,
+            self.speed_halflife,
         ];
+        let [least, most] = self.speed_limit;
         let biases = self.position_bias.iter().chain(&self.facing_bias);
         halflives.iter().all(|h| h.is_finite() && *h >= 0.0)
             && biases.clone().all(|b| b.is_finite() && *b > 0.0)
+            && (least > 0.0 && least <= 1.0 && (1.0..=MOST).contains(&most))
+            && (0.0..=1.0).contains(&self.stand_freedom)
     }
 }
+
+/// Greatest factor on the asked speed that makes sense; more is a mistake.
+const MOST: f32 = 10.0;
 
 /// Share of the way to a target that `dt` covers at a half-life; 1 at half-life 0.
 pub fn share(halflife: f32, dt: f32) -> f32 {
@@ -86,7 +113,38 @@ mod tests {
         assert!((share(tuning.gait_halflife, dt) - 0.1).abs() < 1e-5);
         assert!((share(tuning.pose_halflife, dt) - 0.5).abs() < 1e-5);
         assert_eq!(share(0.0, dt), 1.0);
-        assert!(tuning.is_valid() && Tuning::responsive().is_valid());
-        assert!(!Tuning { gait_halflife: f32::NAN, ..tuning }.is_valid());
+        assert!(tuning.is_valid() && tuning.responsive().is_valid());
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_used_are_told() {
+        let tuning = Tuning::default();
+        let limit = |speed_limit| Tuning { speed_limit, ..tuning };
+        for bad in [
+            Tuning { gait_halflife: f32::NAN, ..tuning },
+            Tuning { speed_halflife: -1.0, ..tuning },
+            Tuning { stand_freedom: 1.5, ..tuning },
+            Tuning { position_bias: [0.0, 1.0], ..tuning },
+            limit([1.1, 1.3]),
+            limit([0.8, 0.9]),
+            limit([0.0, 1.3]),
+            limit([0.8, f32::INFINITY]),
+            limit([f32::NAN, 1.0]),
+        ] {
+            assert!(!bad.is_valid(), "{bad:?}");
+        }
+        assert!(limit([0.8, 1.3]).is_valid());
+    }
+
+    #[test]
+    fn a_bundle_names_only_what_differs() {
+        let read = |json: &str| serde_json::from_str::<Tuning>(json);
+        assert_eq!(read("{}").unwrap(), Tuning::default());
+        let some = read(r#"{"speed_limit": [0.8, 1.3], "stand_freedom": 1}"#).unwrap();
+        let (speed_limit, stand_freedom) = ([0.8, 1.3], 1.0);
+        assert_eq!(some, Tuning { speed_limit, stand_freedom, ..Tuning::default() });
+        assert_eq!(read(&serde_json::to_string(&some).unwrap()).unwrap(), some);
+        let error = read(r#"{"speed_gain": 1}"#).unwrap_err().to_string();
+        assert!(error.contains("unknown field `speed_gain`"), "{error}");
     }
 }

@@ -61,6 +61,8 @@ fn at(blocks: &[Block], name: &str, index: usize) -> usize {
 
 /// (weights outputs × inputs, biases) of the layer that follows what it is told.
 fn follower(layout: &Layout) -> (Vec<f32>, Vec<f32>) {
+    // A tenth of the way to the sample ten frames ahead, in the layout's units and sense.
+    let (pace, turn) = if layout.name() == "holden" { (0.1, -0.1) } else { (6.0, 6.0) };
     let (inputs, outputs) = (layout.input_len(), layout.output_len());
     let mut weights = vec![0.0; inputs * outputs];
     let mut link = |out: usize, input: usize, weight: f32| weights[out * inputs + input] = weight;
@@ -70,10 +72,9 @@ fn follower(layout: &Layout) -> (Vec<f32>, Vec<f32>) {
             link(at(outs, name, sample), at(ins, name, 6 + sample), 1.0);
         }
     }
-    // Ten frames ahead lies the next sample.
-    link(at(outs, "root_velocity", 0), at(ins, "trajectory_x", 7), 0.1);
-    link(at(outs, "root_velocity", 1), at(ins, "trajectory_z", 7), 0.1);
-    link(at(outs, "root_yaw", 0), at(ins, "direction_x", 7), -0.1);
+    link(at(outs, "root_velocity", 0), at(ins, "trajectory_x", 7), pace);
+    link(at(outs, "root_velocity", 1), at(ins, "trajectory_z", 7), pace);
+    link(at(outs, "root_yaw", 0), at(ins, "direction_x", 7), turn);
     let mut biases = vec![0.0; outputs];
     layout.encode_output(&stance(), &mut biases);
     (weights, biases)
@@ -103,7 +104,14 @@ fn header(layout: &Layout) -> Header {
 }
 
 fn bundle(change: impl FnOnce(&mut Header, &mut Vec<f32>, &mut Vec<f32>)) -> Bundle {
-    let layout = Layout::holden(9).unwrap();
+    bundle_of("holden", change)
+}
+
+fn bundle_of(
+    layout: &str,
+    change: impl FnOnce(&mut Header, &mut Vec<f32>, &mut Vec<f32>),
+) -> Bundle {
+    let layout = Layout::named(layout, 9).unwrap();
     let (inputs, outputs) = (layout.input_len(), layout.output_len());
     let (mut weights, mut biases) = follower(&layout);
     let mut header = header(&layout);
@@ -124,7 +132,11 @@ fn bundle(change: impl FnOnce(&mut Header, &mut Vec<f32>, &mut Vec<f32>)) -> Bun
 }
 
 fn model() -> Model {
-    Model::new(Arc::new(bundle(|_, _, _| {}))).unwrap()
+    model_of("holden", |_, _, _| {})
+}
+
+fn model_of(layout: &str, change: impl FnOnce(&mut Header, &mut Vec<f32>, &mut Vec<f32>)) -> Model {
+    Model::new(Arc::new(bundle_of(layout, change))).unwrap()
 }
 
 fn stroll(world: &World<'_>) -> Controller {
@@ -190,6 +202,62 @@ fn strafing_faces_elsewhere_and_standing_stops() {
     assert!(character.root().position.distance(before.position) < 1e-3, "stands");
 }
 
+/// The published layout has one input for jogging and running.
+#[test]
+fn running_is_jogging_where_the_layout_has_one_input() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let walk = |gait: Gait| {
+        let mut character = stroll(&world);
+        for frame in 0..300 {
+            let intent = Intent { gait, ..wandering(frame as f32 * STEP) };
+            character.step(STEP, &intent, &world);
+        }
+        (character.root(), globals(&character))
+    };
+    assert_eq!(walk(Gait::Run), walk(Gait::Jog));
+}
+
+/// What a network is told of the gait reaches it in its own input.
+#[test]
+fn the_ambulo_layout_tells_running_from_jogging() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let layout = Layout::ambulo(9).unwrap();
+    let inputs = layout.input_len();
+    // The hips rise by 20 cm when jogging, by 40 when running, by 60 when crouching.
+    let gaits = [("gait_jog", 0.2), ("gait_run", 0.4), ("gait_crouch", 0.6)];
+    let model = model_of("ambulo", |_, weights, _| {
+        for (name, rise) in gaits {
+            weights[at(layout.outputs(), "joint_position", 1) * inputs
+                + at(layout.inputs(), name, 6)] = rise;
+        }
+    });
+    let hips = |gait: Gait, speed: f32| {
+        let mut character =
+            Controller::new(model.clone(), model.tuning(), Vec2::ZERO, 0.0, &world).unwrap();
+        let intent = Intent { velocity: Vec2::new(0.0, speed), gait, ..Intent::default() };
+        for _ in 0..180 {
+            assert_eq!(character.step(STEP, &intent, &world).event, None);
+        }
+        globals(&character)[0].translation.y - 0.95
+    };
+    for (gait, speed, rise) in [
+        (Gait::Walk, 1.5, 0.0),
+        (Gait::Jog, 3.0, 0.2),
+        (Gait::Run, 5.0, 0.4),
+        (Gait::Crouch, 1.0, 0.6),
+        (Gait::Auto, 1.5, 0.0),
+        (Gait::Auto, 2.1, 0.1),
+        (Gait::Auto, 3.0, 0.2),
+        (Gait::Auto, 3.9, 0.3),
+        (Gait::Auto, 5.0, 0.4),
+    ] {
+        let got = hips(gait, speed);
+        assert!((got - rise).abs() < 2e-3, "{gait:?} at {speed} m/s: {got}");
+    }
+}
+
 /// The ankles of the shown pose are where the network has them, on bones of the skeleton's length.
 #[test]
 fn feet_are_where_the_network_puts_them() {
@@ -252,6 +320,57 @@ fn feet_stay_above_the_ground() {
     let [left, right] = [4, 8].map(|toe| globals(&character)[toe].translation.y);
     assert!((left - 0.12).abs() < 2e-3, "half a foot's thickness above the kerb: {left}");
     assert!((right - 0.04).abs() < 2e-3, "{right}");
+}
+
+/// A skeleton whose feet are one joint each: heel and toe are the same.
+#[test]
+fn feet_without_toes_are_held_and_lifted_too() {
+    let areas = Areas::default();
+    let toeless = || {
+        model_of("holden", |header, _, _| {
+            let feet = Feet { joints: [3, 3, 7, 7], heights: [0.09; 4] };
+            header.parts.insert("feet".into(), serde_json::to_value(feet).unwrap());
+        })
+    };
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let mut character =
+        Controller::new(toeless(), Tuning::default(), Vec2::ZERO, 0.0, &world).unwrap();
+    let start = globals(&character)[3].translation;
+    while character.root().position.length() < 0.08 {
+        assert_eq!(character.step(STEP, &wandering(0.0), &world).event, None);
+    }
+    let slid = globals(&character)[3].translation.distance(start);
+    assert!(slid < 0.02, "held at the ankle: {slid}");
+    // Ground that comes up by more than the network knows lifts the ankle.
+    struct Stone(f32);
+    impl Terrain for Stone {
+        fn height(&self, _: f32, z: f32) -> f32 {
+            if (z - self.0).abs() < 0.05 { 0.1 } else { 0.0 }
+        }
+    }
+    let stone = Stone(globals(&character)[3].translation.z);
+    let world = World { terrain: &stone, areas: &areas };
+    (0..2).for_each(|_| assert_eq!(character.step(STEP, &wandering(0.0), &world).event, None));
+    let lifted = globals(&character)[3].translation.y;
+    assert!((lifted - 0.1 - 0.045).abs() < 2e-3, "above the stone: {lifted}");
+}
+
+/// Feet that hang on the hips themselves have no legs to bend; the pose is the network's own.
+#[test]
+fn skeletons_without_legs_are_shown_as_they_are() {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let model = model_of("holden", |header, _, _| {
+        let feet = Feet { joints: [1, 1, 5, 5], heights: [0.1; 4] };
+        header.parts.insert("feet".into(), serde_json::to_value(feet).unwrap());
+    });
+    let mut character = Controller::new(model, Tuning::default(), Vec2::ZERO, 0.0, &world).unwrap();
+    for frame in 0..120 {
+        let intent = wandering(frame as f32 * STEP);
+        assert_eq!(character.step(STEP, &intent, &world).event, None);
+    }
+    let hips = globals(&character)[0].translation;
+    assert!((hips.y - 0.95).abs() < 1e-4 && character.root().position.length() > 1.0);
 }
 
 #[test]
@@ -438,6 +557,23 @@ fn refuses_bundles_that_do_not_fit() {
     let feet =
         refused(|header, _, _| header.parts.get_mut("feet").unwrap()["joints"][0] = 99.into());
     assert!(matches!(feet, ControlError::Broken { part: "feet", .. }));
+    let tuned = |json: &str| {
+        let tuning: serde_json::Value = serde_json::from_str(json).unwrap();
+        let with = |header: &mut Header| header.parts.insert("tuning".into(), tuning);
+        let made = Model::new(Arc::new(bundle(|header, _, _| {
+            with(header);
+        })));
+        made.map(|model| model.tuning()).map_err(|error| error.to_string())
+    };
+    assert_eq!(
+        tuned(r#"{"stand_freedom": 2}"#).unwrap_err(),
+        "the bundle's 'tuning' part is broken: a number that is out of range"
+    );
+    let unknown = tuned(r#"{"stand_fredom": 1}"#).unwrap_err();
+    assert!(unknown.contains("'tuning' part is broken: unknown field `stand_fredom`"), "{unknown}");
+    let freer = Tuning { stand_freedom: 1.0, ..Tuning::default() };
+    assert_eq!(tuned(r#"{"stand_freedom": 1}"#).unwrap(), freer);
+    assert_eq!(model().tuning(), Tuning::default());
     let loops = refused(|header, _, _| {
         header.parts.get_mut("skeleton").unwrap()[1]["parent"] = 5.into();
     });

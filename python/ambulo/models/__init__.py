@@ -1,0 +1,1 @@
+"""Architectures, one file each: pure JAX, and nothing of ours."""
