@@ -28,14 +28,14 @@ endif
 # a removed file counts too.
 NATIVE_SOURCES := Cargo.toml $(wildcard Cargo.lock) pyproject.toml $(shell find crates bindings \
 	-type d -o -name '*.rs' -o -name Cargo.toml)
-PYTHON_CODE := python tests/python $(wildcard benches) docs/pictures fuzz/make_seeds.py tools/check-rooms
+PYTHON_CODE := python tests/python $(wildcard benches) fuzz/make_seeds.py tools/check-rooms
 LOCKS := $(wildcard requirements/*.txt Cargo.lock fuzz/Cargo.lock)
 CARGO_SOURCE := source = "registry+https://github.com/rust-lang/crates.io-index"
 
 comma := ,
 say = @printf '\n==> %s\n' "$(1)"
 
-.PHONY: help setup demo test bench fuzz format lock deny clean \
+.PHONY: help setup demo starter test bench fuzz format lock deny clean \
 	preflight-test test-format test-locks test-rooms test-types test-clippy test-rust \
 	test-rustdoc test-python test-fuzz-builds test-licences
 
@@ -73,6 +73,17 @@ $(VENV)/.bench: requirements/bench.txt $(VENV)/.packages
 demo: setup ## Build, then make the demonstration in out/
 	$(call say,Running the demonstration)
 	$(BIN)/ambulo demo
+
+# The numbers depend on JAX's version and on the processor in their last bits.
+STARTER := out/starter
+starter: setup ## Make starters/human.safetensors anew (minutes)
+	$(call say,Making the starter motion and the starter model)
+	$(BIN)/ambulo starter motion -o $(STARTER)/motion --overwrite
+	$(BIN)/ambulo dataset build $(STARTER)/motion -o $(STARTER)/data --overwrite \
+		--licence "MIT OR Apache-2.0: motion made by rule by Ambulo, nobody's recording"
+	$(BIN)/ambulo train $(STARTER)/data -o $(STARTER)/human.safetensors --preset starter --overwrite
+	@mkdir -p starters
+	$(BIN)/ambulo model half $(STARTER)/human.safetensors -o starters/human.safetensors --overwrite
 
 ## -- checking ------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Writes the seeds that no editor can: a whole bundle, as small as one can be.
+"""Writes the seeds that no editor can: whole bundles of either precision, as small as can be.
 
 .venv/bin/python fuzz/make_seeds.py
 """
@@ -32,5 +32,6 @@ def ones(*shape: int) -> np.ndarray:
 if __name__ == "__main__":
     layers = [(ones(4, 2, 2), ones(4, 2)), (ones(4, 1, 2), ones(4, 1))]
     model = _core.Model.build(json.dumps(HEADER), layers, ones(2), ones(2), ones(1), ones(1))
-    path = Path(__file__).parent / "seeds" / "bundle" / "tiny.safetensors"
-    path.write_bytes(model.to_bytes())
+    folder = Path(__file__).parent / "seeds" / "bundle"
+    (folder / "tiny.safetensors").write_bytes(model.to_bytes())
+    (folder / "tiny_half.safetensors").write_bytes(model.to_bytes(half=True))

@@ -89,6 +89,8 @@ class _Layout(TypedDict):
     hash: str
     fps: float
     units_per_metre: float
+    rate_time: float
+    yaw_sign: float
     inputs: list[tuple[str, int]]
     outputs: list[tuple[str, int]]
 

@@ -177,7 +177,8 @@ impl Model {
     }
 }
 
-/// A layout's tables: name, hash, fps, units_per_metre, inputs and outputs as (name, size) lists.
+/// A layout's tables: name, hash, fps, units_per_metre, rate_time (seconds that velocities count
+/// in), yaw_sign (−1 where turning to the left is negative), inputs and outputs as (name, size) lists.
 #[pyfunction]
 pub fn layout<'py>(py: Python<'py>, name: &str, joints: usize) -> PyResult<Bound<'py, PyDict>> {
     let layout = Layout::named(name, joints).map_err(value_error)?;
@@ -189,6 +190,8 @@ pub fn layout<'py>(py: Python<'py>, name: &str, joints: usize) -> PyResult<Bound
     dict.set_item("hash", layout.hash())?;
     dict.set_item("fps", layout.fps())?;
     dict.set_item("units_per_metre", layout.units_per_metre())?;
+    dict.set_item("rate_time", layout.rate_time())?;
+    dict.set_item("yaw_sign", layout.yaw_sign())?;
     dict.set_item("inputs", table(layout.inputs()))?;
     dict.set_item("outputs", table(layout.outputs()))?;
     Ok(dict)

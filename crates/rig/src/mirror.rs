@@ -235,7 +235,12 @@ fn local_reflection(
     };
     let length = skeleton.children(joint).map(|c| offset(c).length()).fold(0.0, f64::max);
     let least = candidates.iter().map(miss).fold(f64::INFINITY, f64::min);
-    let (own, other) = (mean_rotation(clip, joint), mean_rotation(clip, partner[joint]));
+    let mean = |joint: usize| match skeleton.joints()[joint].parent {
+        Some(_) => mean_rotation(clip, joint, |_| DQuat::IDENTITY),
+        // The root's rotation without its heading: the choice must not depend on where a clip goes.
+        None => mean_rotation(clip, joint, |frame| ahead(clip, partner, world, frame)),
+    };
+    let (own, other) = (mean(joint), mean(partner[joint]));
     let turn = |l: &DMat3| sandwich(parent, other, *l).angle_between(own);
     let fitting = candidates.iter().filter(|l| miss(l) <= least + 0.05 * length);
     let fitting: Vec<_> = fitting.collect();
@@ -244,17 +249,35 @@ fn local_reflection(
     best.map_or(world, |l| **l)
 }
 
-/// The normalised sum of a joint's rotations, all on the first one's side.
-fn mean_rotation(clip: &Clip, joint: usize) -> DQuat {
-    let first = clip.rotations(0)[joint];
+/// The rotation that turns a frame's character so that its partners lie across the mirror's plane.
+fn ahead(clip: &Clip, partner: &[usize], world: DMat3, frame: usize) -> DQuat {
+    let mut places = vec![];
+    clip.positions(frame, &mut places);
+    let pairs = partner.iter().enumerate().filter(|(joint, other)| joint < other);
+    let across: DVec3 = pairs.map(|(joint, &other)| places[joint] - places[other]).sum();
+    // What the reflection turns round is the part of a vector along the plane's normal.
+    let normal = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis - world * axis);
+    let normal = normal
+        .into_iter()
+        .fold(DVec3::ZERO, |longest, n| if n.length() > longest.length() { n } else { longest });
+    match (across.try_normalize(), normal.try_normalize()) {
+        (Some(across), Some(normal)) => {
+            DQuat::from_rotation_arc(across, normal * across.dot(normal).signum())
+        }
+        _ => DQuat::IDENTITY,
+    }
+}
+
+/// The normalised sum of a joint's rotations, each after a turn of its frame, all on the first
+/// one's side.
+fn mean_rotation(clip: &Clip, joint: usize, turn: impl Fn(usize) -> DQuat) -> DQuat {
+    let rotation = |frame: usize| turn(frame) * clip.rotations(frame)[joint];
+    let first = rotation(0);
     // A few dozen frames say as much as all of them.
     let frames = (0..clip.frames()).step_by(clip.frames().div_ceil(64));
-    let sum = frames.map(|frame| clip.rotations(frame)[joint]).fold(
-        DQuat::from_array([0.0; 4]),
-        |sum, q| {
-            if q.dot(first) < 0.0 { sum - q } else { sum + q }
-        },
-    );
+    let sum = frames.map(rotation).fold(DQuat::from_array([0.0; 4]), |sum, q| {
+        if q.dot(first) < 0.0 { sum - q } else { sum + q }
+    });
     if sum.length() > 1e-6 { sum.normalize() } else { first }
 }
 
@@ -357,6 +380,30 @@ mod tests {
         let clip = Clip::new(skeleton, 0.1, vec![0], vec![DVec3::Y], rotations).unwrap();
         let mirror = Mirror::by_name(&clip, DVec3::X).unwrap();
         assert_mirrors(&clip, &mirror, 1e-6);
+    }
+
+    /// Hips whose children all lie in their own middle (the PFNN's skeleton) fit any reflection: which
+    /// one is taken must not depend on where the character walks, or its hips face backwards.
+    #[test]
+    fn where_a_clip_walks_changes_nothing() {
+        let skeleton = Skeleton::new(vec![
+            joint("Hips", None, [0.0, 0.0, 0.0]),
+            joint("LeftHip", Some(0), [0.0, 0.0, 0.0]),
+            joint("LeftFoot", Some(1), [0.1, -0.9, 0.1]),
+            joint("RightHip", Some(0), [0.0, 0.0, 0.0]),
+            joint("RightFoot", Some(3), [-0.1, -0.9, 0.0]),
+        ])
+        .unwrap();
+        for heading in 0..12 {
+            let heading = f64::from(heading) * std::f64::consts::FRAC_PI_6;
+            let mut rotations = vec![DQuat::IDENTITY; 5];
+            rotations[0] = DQuat::from_rotation_y(heading);
+            let clip = Clip::new(skeleton.clone(), 0.1, vec![], vec![], rotations).unwrap();
+            let mirrored = Mirror::by_name(&clip, DVec3::X).unwrap().apply(&clip).unwrap();
+            let expected = DQuat::from_rotation_y(-heading);
+            let off = mirrored.rotations(0)[0].angle_between(expected);
+            assert!(off < 1e-6, "heading {heading}: the mirrored hips are {off} rad off");
+        }
     }
 
     #[test]

@@ -7,10 +7,15 @@ from typing import Any
 
 import click
 
-from ambulo.cli.character import demo, import_, model, walk
+from ambulo.cli.accuracy import accuracy
+from ambulo.cli.character import import_, model, walk
 from ambulo.cli.dataset import dataset
+from ambulo.cli.demo import demo
+from ambulo.cli.evaluate import evaluate
 from ambulo.cli.motion import motion
+from ambulo.cli.starter import starter
 from ambulo.cli.stopping import STOPPED
+from ambulo.cli.train import export, train
 
 EPILOG = """Examples:
 
@@ -70,8 +75,9 @@ def completion(shell: str) -> None:
     click.echo(found(cli, {}, "ambulo", "_AMBULO_COMPLETE").source())
 
 
-for command in (dataset, demo, import_, model, motion, walk):
+for command in (dataset, demo, evaluate, export, import_, model, motion, starter, train, walk):
     cli.add_command(command)
+evaluate.add_command(accuracy)
 
 
 def main() -> None:

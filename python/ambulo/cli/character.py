@@ -1,9 +1,8 @@
-"""Commands that use a model: import, look, walk, and the demo."""
+"""Commands that use a model: import, look, walk."""
 
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import time
 from pathlib import Path
@@ -206,39 +205,6 @@ def walk(
     _walk(
         path, load_model(path), load_track(track), Terrain.named(terrain, seed), terrain, laps,
         responsive=responsive, output=output, film=film, as_json=as_json,
-    )  # fmt: skip
-
-
-@click.command()
-@click.option(
-    "-o", "--output", default="out/demo", show_default=True,
-    type=click.Path(file_okay=False, path_type=Path), help="Folder to write.",
-)  # fmt: skip
-def demo(output: Path) -> None:
-    """Show the main job: a trained character walks the seeds' track.
-
-    Uses the PFNN authors' network from $AMBULO_DATA (default: ../shared/data).
-
-    \b
-    Example:
-      AMBULO_DATA=~/motion ambulo demo -o out/demo
-    """
-    data = Path(os.environ.get("AMBULO_DATA") or "../shared/data")
-    network = data / "holden-pfnn" / "network"
-    if not network.is_dir():
-        click.echo(
-            f"There is no trained network at {network}, so there is nothing to show. Get the "
-            "authors' weights (demo/network/pfnn in the download of the PFNN paper, "
-            "theorangeduck.com/page/phase-functioned-neural-networks-character-control), put the "
-            ".bin files there, or name the folder above holden-pfnn in $AMBULO_DATA."
-        )
-        return
-    click.echo(f"Importing {network}")
-    character = load_model(network)
-    click.echo(f"Walking the seeds' track. {character.header['licence']}")
-    _walk(
-        network, character, load_track("seeds"), Terrain.flat(), "flat", 1,
-        responsive=False, output=output, film="gif", as_json=False,
     )  # fmt: skip
 
 

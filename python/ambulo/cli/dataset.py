@@ -141,9 +141,6 @@ def _planned(
     if not sources:
         raise click.UsageError(f"{folder} has no {MANIFEST} yet: name motion files or folders")
     files = [file for source in sources for file in motion_files(source)]
-    if not files:
-        listed = ", ".join(map(str, sources))
-        raise click.ClickException(f"no .bvh or .amc file in {listed}")
     settings = config.read_text(encoding="utf-8") if config else ""
     if _checked(settings, config or Path(MANIFEST))["licence"] == "":
         words = licence if licence is not None else found_licence(sources)

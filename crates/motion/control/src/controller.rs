@@ -4,7 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use ambulo_features::{Input, Output};
 use ambulo_net::Scratch;
-use ambulo_rig::glam::{Vec2, Vec3};
+use ambulo_rig::glam::{Quat, Vec2, Vec3};
 use ambulo_rig::{Pose, Transform};
 
 use crate::feet::Hold;
@@ -15,6 +15,13 @@ use crate::{ControlError, Intent, Model, TrajectoryPoint, Tuning, World};
 
 /// Longest time that one call catches up on, seconds.
 const LONGEST: f32 = 1.0;
+
+/// No joint of a person turns faster, radians a second: a jump of the network's is spread out.
+const FASTEST_TURN: f32 = 35.0;
+
+/// Feet take no more than this share off the root's speed: a network that slides along without
+/// stepping must still get where it is asked to go.
+const MOST_DRIVEN: f32 = 0.35;
 
 /// A joint farther from its root than this is a broken prediction, metres.
 const REACH: f32 = 10.0;
@@ -173,7 +180,7 @@ impl Controller {
         controller.model.layout().decode_output(&controller.y, &mut controller.output);
         controller.find_legs();
         controller.take_pose(1.0);
-        controller.show(world);
+        controller.show(world, f32::INFINITY);
         // The mean pose is nobody's stance: no foot is held in it.
         controller.next.holds = [Hold::default(); 2];
         if !controller.next.is_finite() {
@@ -245,13 +252,36 @@ impl Controller {
         if !body || !self.y.iter().all(|number| number.is_finite()) {
             return Err(Held::Network);
         }
+        self.next.trajectory.carry(self.slide(dt), world.areas, dt);
         self.take_pose(share(self.tuning.pose_halflife, dt));
-        self.show(world);
+        self.show(world, FASTEST_TURN * dt);
         let freedom = self.next.trajectory.freedom(&self.tuning);
         let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
         self.next.phase = (self.next.phase + TAU * cycles).rem_euclid(TAU);
         self.next.trajectory.advance(&self.output, &self.tuning, world.areas, dt);
         if self.next.is_finite() { Ok(()) } else { Err(Held::Network) }
+    }
+
+    /// How far the root must go so that the balls of the feet in contact stay where they were, as
+    /// far as the tuning wants it: what the root's velocity and the pose disagree on is a slide.
+    fn slide(&self, dt: f32) -> Vec2 {
+        let drive = self.tuning.foot_drive;
+        let now = self.next.trajectory.now();
+        let (root, outward, feet) = (now.root(), now.rotation(), self.model.feet());
+        let (mut sum, mut weights) = (Vec2::ZERO, 0.0);
+        for toe in [1, 3] {
+            let joint = feet.joints[toe];
+            let place = outward * self.output.joint_position[joint] + root;
+            let slid = place - self.next.positions[joint];
+            // In contact before and after: a foot that lands or leaves moves by itself.
+            let contact = self.next.contacts[toe].min(self.output.contacts[toe]);
+            let weight = (2.0 * contact - 1.0).clamp(0.0, 1.0);
+            sum += Vec2::new(slid.x, slid.z) * weight;
+            weights += weight;
+        }
+        // Half a foot surely down is enough to go by.
+        let shift = sum * (-drive / weights.max(0.5));
+        shift.clamp_length_max(MOST_DRIVEN * self.next.trajectory.speed() * dt)
     }
 
     /// Legs bend the way that the mean pose does: knees never bend backward, so their mean is bent.
@@ -270,6 +300,12 @@ impl Controller {
         let (root, inward) = (before.root(), before.rotation().inverse());
         for (told, position) in self.input.joint_position.iter_mut().zip(&self.next.positions) {
             *told = inward * (*position - root);
+        }
+        if let Some(wish) = trajectory.sway() {
+            let joints = self.input.joint_position.iter_mut().enumerate();
+            // The feet stay: what stirs is the body over them.
+            let upper = joints.filter(|(joint, _)| !self.model.in_legs(*joint));
+            upper.for_each(|(joint, told)| *told += wish.stir(joint));
         }
         for (told, velocity) in self.input.joint_velocity.iter_mut().zip(&self.next.velocities) {
             *told = inward * *velocity;
@@ -297,18 +333,21 @@ impl Controller {
     }
 
     /// The shown pose: the network's rotations on the skeleton's own bones, hung from the hips,
-    /// with legs bent so that the ankles are where the network has them. (Its bones vary in length
+    /// with legs bent so that the ankles are where the network has them; no joint turns by more than
+    /// `most` radians from the pose before. (Its bones vary in length
     /// with the pose, so rotations alone would leave the feet centimetres off the ground.) None of
     /// it is fed back.
-    fn show(&mut self, world: &World<'_>) {
+    fn show(&mut self, world: &World<'_>, most: f32) {
         let skeleton = self.model.skeleton();
         for (index, joint) in skeleton.joints().iter().enumerate() {
             let own = self.global[index];
             self.next.pose.local[index] = match joint.parent {
-                Some(parent) => Transform::new(
-                    joint.offset.as_vec3(),
-                    (self.global[parent].rotation.inverse() * own.rotation).normalize(),
-                ),
+                Some(parent) => {
+                    let turned = self.global[parent].rotation.inverse() * own.rotation;
+                    let before = self.state.pose.local[index].rotation;
+                    let turned = no_snap(before, turned.normalize(), most);
+                    Transform::new(joint.offset.as_vec3(), turned)
+                }
                 None => own,
             };
         }
@@ -382,7 +421,28 @@ impl Controller {
     }
 }
 
+/// A rotation, but no farther than `most` radians from the one before.
+fn no_snap(before: Quat, now: Quat, most: f32) -> Quat {
+    let angle = before.angle_between(now);
+    if angle > most { before.slerp(now, most / angle) } else { now }
+}
+
 /// The same angle in [−π, π).
 fn wrapped(angle: f32) -> f32 {
     (angle + PI).rem_euclid(TAU) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_is_spread_out() {
+        let (from, to) = (Quat::from_rotation_y(0.2), Quat::from_rotation_y(2.2));
+        let one = no_snap(from, to, 0.5);
+        assert!((one.angle_between(from) - 0.5).abs() < 1e-5);
+        assert!((one.angle_between(to) - 1.5).abs() < 1e-5);
+        assert_eq!(no_snap(from, to, 2.5), to);
+        assert_eq!(no_snap(from, to, f32::INFINITY), to);
+    }
 }

@@ -9,9 +9,16 @@ pub struct Leg {
     upper: usize,
     lower: usize,
     foot: usize,
-    /// What a straight leg bends about, in the frame of the lower joint.
+    /// What the leg bends about, in the frame of the lower joint.
     hinge: Vec3,
+    /// Whether that is measured, not supposed.
+    sure: bool,
 }
+
+/// Sine of the angle between the upper bone and the leg's whole line, below which a bend tells
+/// little of where the knee goes: legs are often straight within a network's error, and a knee that
+/// is a degree on the wrong side must not be bent on that side when the foot comes nearer.
+const STRAIGHT: f32 = 0.1;
 
 impl Leg {
     /// The two bones above a foot; `None` where it has no two. `bent` has the transforms, in the
@@ -28,7 +35,7 @@ impl Leg {
         let clear = across.length() > 0.01 * (c - a).length() * (b - a).length();
         let axis = if clear { across.normalize().as_vec3() } else { Vec3::NEG_X };
         let hinge = bent[lower].rotation.inverse() * axis;
-        Some(Self { upper, lower, foot, hinge })
+        Some(Self { upper, lower, foot, hinge, sure: clear })
     }
 
     /// Bends the leg so that its foot comes to `ankle`, or as near as it can; the foot keeps its
@@ -44,7 +51,7 @@ impl Leg {
         let place = |joint: usize| global[joint].translation;
         let (hip, knee, foot) = (place(self.upper), place(self.lower), place(self.foot));
         let hinge = global[self.lower].rotation * self.hinge;
-        let [upper, lower] = two_bone(hip, knee, foot, ankle, hinge);
+        let [upper, lower] = two_bone([hip, knee, foot], ankle, hinge, self.sure);
         global[self.upper].rotation = (upper * global[self.upper].rotation).normalize();
         global[self.lower].rotation = (lower * global[self.lower].rotation).normalize();
         for joint in [self.upper, self.lower, self.foot] {
@@ -57,8 +64,9 @@ impl Leg {
 }
 
 /// Turns, in the world, of the upper and the lower bone of a chain a–b–c that bring c to `target`
-/// in the plane in which it bends already; `hinge` is the axis to bend about when it is straight.
-fn two_bone(a: Vec3, b: Vec3, c: Vec3, target: Vec3, hinge: Vec3) -> [Quat; 2] {
+/// in the plane in which it bends already; `hinge` is the axis to bend about when it is straight,
+/// and, if that is `sure`, the more so the nearer to straight it is, or bent the wrong way.
+fn two_bone([a, b, c]: [Vec3; 3], target: Vec3, hinge: Vec3, sure: bool) -> [Quat; 2] {
     let (upper, lower) = (a.distance(b), b.distance(c));
     // Written so that NaN is refused too: clamping needs ordered bounds.
     let long = |length: f32| length > 1e-4 && length.is_finite();
@@ -77,10 +85,30 @@ fn two_bone(a: Vec3, b: Vec3, c: Vec3, target: Vec3, hinge: Vec3) -> [Quat; 2] {
     let at_b = opposite(reach, upper, lower) - opposite(now, upper, lower);
     let across = (c - a).cross(b - a);
     let straight = across.length() < 1e-3 * upper * now;
+    let bend = across.dot(hinge) / (upper * now);
+    if sure && !straight && bend < STRAIGHT {
+        let drawn = (bend / STRAIGHT).max(0.0);
+        let axis = (across / (upper * now) / STRAIGHT).lerp(hinge, 1.0 - drawn);
+        return toward([a, b, c], target, reach, axis);
+    }
     let axis = if straight { hinge.normalize_or(Vec3::X) } else { across.normalize() };
     let swing = Quat::from_rotation_arc((c - a).normalize(), (target - a).normalize());
     let upper = swing * Quat::from_axis_angle(axis, at_a);
     [upper, upper * Quat::from_axis_angle(axis, at_b)]
+}
+
+/// The turns that bring c to `reach` from a, towards `target`, with b on the side that bending
+/// about `axis` puts it; the bones twist as little as they can.
+fn toward([a, b, c]: [Vec3; 3], target: Vec3, reach: f32, axis: Vec3) -> [Quat; 2] {
+    let (upper, lower) = (a.distance(b), b.distance(c));
+    let line = (target - a).normalize();
+    let pole = axis.cross(line).normalize_or(line.any_orthonormal_vector());
+    let along = (upper * upper + reach * reach - lower * lower) / (2.0 * reach);
+    let knee = line * along + pole * (upper * upper - along * along).max(0.0).sqrt();
+    let first = Quat::from_rotation_arc((b - a) / upper, knee.normalize_or(line));
+    let shin = (line * reach - knee).normalize_or(line);
+    let second = Quat::from_rotation_arc(first * ((c - b) / lower), shin);
+    [first, second * first]
 }
 
 #[cfg(test)]
@@ -111,7 +139,7 @@ mod tests {
     #[test]
     fn only_feet_with_two_bones_below_the_root_have_legs() {
         let (skeleton, leg) = leg();
-        assert_eq!(leg, Leg { upper: 1, lower: 2, foot: 3, hinge: Vec3::NEG_X });
+        assert_eq!(leg, Leg { upper: 1, lower: 2, foot: 3, hinge: Vec3::NEG_X, sure: false });
         let pose = [Transform::IDENTITY; 4];
         assert_eq!(Leg::above(&skeleton, 2, &pose), None);
         assert_eq!(Leg::above(&skeleton, 0, &pose), None);
@@ -151,12 +179,48 @@ mod tests {
         assert!(global[3].translation.abs_diff_eq(Vec3::new(0.0, 0.25, 0.0), 1e-3));
     }
 
+    /// A knee drawn a little too straight, or too far, stays in front when the foot comes nearer.
+    #[test]
+    fn knees_do_not_bend_backward() {
+        let (skeleton, _) = leg();
+        let bent = |flex: f32| {
+            let mut pose = skeleton.rest_pose();
+            pose.local[1].rotation = Quat::from_rotation_x(-flex / 2.0);
+            pose.local[2].rotation = Quat::from_rotation_x(flex);
+            let mut global = vec![Transform::IDENTITY; 4];
+            pose.to_global(&skeleton, &mut global);
+            (pose, global)
+        };
+        let leg = Leg::above(&skeleton, 3, &bent(0.5).1).unwrap();
+        let knee = |flex: f32| {
+            let (mut pose, mut global) = bent(flex);
+            let ankle = Vec3::new(0.02, 0.15, 0.03);
+            leg.reach(&skeleton, ankle, &mut pose, &mut global);
+            assert!(global[3].translation.abs_diff_eq(ankle, 1e-3), "{flex}: it arrives");
+            let thigh = (global[1].rotation, global[2].rotation);
+            (global[2].translation, thigh)
+        };
+        let mut before = knee(0.6);
+        for step in 1..80 {
+            let flex = 0.6 - 0.01 * step as f32;
+            let now = knee(flex);
+            assert!(now.0.z > 0.1, "{flex}: {}", now.0);
+            // No jump, and no twist, as the drawn leg passes through straight.
+            assert!(now.0.distance(before.0) < 0.01, "{flex}");
+            for (a, b) in [(before.1.0, now.1.0), (before.1.1, now.1.1)] {
+                assert!(a.angle_between(b) < 0.05, "{flex}: {}", a.angle_between(b));
+            }
+            before = now;
+        }
+    }
+
     #[test]
     fn numbers_that_are_none_leave_the_leg_alone() {
         for bad in [f32::NAN, f32::INFINITY, 1e38] {
             let far = Vec3::splat(bad);
-            assert_eq!(two_bone(far, far, far, far, Vec3::X), [Quat::IDENTITY; 2]);
-            assert_eq!(two_bone(Vec3::Y, Vec3::ZERO, far, far, Vec3::X), [Quat::IDENTITY; 2]);
+            for chain in [[far; 3], [Vec3::Y, Vec3::ZERO, far]] {
+                assert_eq!(two_bone(chain, far, Vec3::X, true), [Quat::IDENTITY; 2]);
+            }
         }
     }
 

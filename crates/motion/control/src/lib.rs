@@ -11,6 +11,7 @@
 mod areas;
 mod controller;
 mod feet;
+mod idle;
 mod intent;
 mod legs;
 mod model;

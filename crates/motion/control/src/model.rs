@@ -56,6 +56,7 @@ pub struct Model {
     layout: Layout,
     skeleton: Arc<Skeleton>,
     feet: Feet,
+    in_legs: Arc<[bool]>,
     tuning: Tuning,
 }
 
@@ -102,7 +103,24 @@ impl Model {
         if !tuning.is_valid() {
             return broken("tuning", "a number that is out of range");
         }
-        Ok(Self { layout, skeleton: Arc::new(skeleton), feet, tuning, bundle: bundle.clone() })
+        let mut in_legs = vec![false; joints.len()];
+        for foot in feet.joints {
+            let mut joint = foot;
+            // All the way up but for the root, which carries the body too.
+            while let Some(parent) = joints[joint].parent {
+                in_legs[joint] = true;
+                joint = parent;
+            }
+        }
+        let in_legs = in_legs.into();
+        Ok(Self {
+            layout,
+            skeleton: Arc::new(skeleton),
+            feet,
+            in_legs,
+            tuning,
+            bundle: bundle.clone(),
+        })
     }
 
     /// The bundle as it was loaded.
@@ -153,6 +171,11 @@ impl Model {
     /// What the bundle says that it moves best with; the published one where it says nothing.
     pub fn tuning(&self) -> Tuning {
         self.tuning
+    }
+
+    /// Whether a joint carries a foot or is one.
+    pub(crate) fn in_legs(&self, joint: usize) -> bool {
+        self.in_legs[joint]
     }
 
     /// Heels and toes.

@@ -3,6 +3,7 @@
 use ambulo_features::{FUTURE, GAITS, Ground, Output, Point, SAMPLES, WINDOW};
 use ambulo_rig::glam::{Quat, Vec2, Vec3};
 
+use crate::idle::{Idle, Wish};
 use crate::tuning::share;
 use crate::{Areas, Gait, Intent, Tuning, World};
 
@@ -98,6 +99,10 @@ pub struct Trajectory {
     crouch: f32,
     /// Of the last step, metres a second.
     moved: Vec2,
+    /// What the feet added to it.
+    carried: Vec2,
+    idle: Idle,
+    sway: Option<Wish>,
     speed: SpeedGain,
 }
 
@@ -153,8 +158,16 @@ impl Trajectory {
             strafe: 0.0,
             crouch: 0.0,
             moved: Vec2::ZERO,
+            carried: Vec2::ZERO,
+            idle: Idle::default(),
+            sway: None,
             speed: SpeedGain::STANDING,
         }
+    }
+
+    /// How the character is asked to stand, if it is.
+    pub fn sway(&self) -> Option<Wish> {
+        self.sway
     }
 
     pub fn points(&self) -> &[TrajectoryPoint; WINDOW_POINTS] {
@@ -214,6 +227,9 @@ impl Trajectory {
         let velocity = self.velocity * (self.speed.factor * dt);
         let (facing, gait) = (self.facing, self.points[NOW].gait);
         let mut foreseen = self.points[NOW].ground();
+        let stands = gait[STAND] > 0.5;
+        let direction = self.points[NOW].direction;
+        self.sway = self.idle.follow(stands, foreseen, direction, tuning.sway, dt);
         for index in NOW + 1..WINDOW_POINTS {
             let t = (index - NOW) as f32 / WINDOW as f32;
             let toward = |bias: f32| 1.0 - (1.0 - t).powf(bias);
@@ -221,7 +237,11 @@ impl Trajectory {
             let point = &mut self.points[index];
             let step = point.ground() - foreseen;
             foreseen = point.ground();
-            let place = before + step.lerp(velocity, toward(position_bias));
+            let wished = match self.sway {
+                Some(wish) => velocity + wish.velocity((index - NOW) as f32 * dt) * dt,
+                None => velocity,
+            };
+            let place = before + step.lerp(wished, toward(position_bias));
             point.set_ground(areas.keep_out(place));
             point.direction = turn(point.direction, facing, toward(facing_bias));
             point.gait = gait;
@@ -279,16 +299,36 @@ impl Trajectory {
         published + (1.0 - published) * tuning.stand_freedom
     }
 
+    /// Of the root in the step before, as the network has it, metres a second.
+    pub fn speed(&self) -> f32 {
+        (self.moved - self.carried).length()
+    }
+
+    /// Moves the present and the future by what the feet say; part of the step that came before.
+    pub fn carry(&mut self, shift: Vec2, areas: &Areas, dt: f32) {
+        self.carried = shift / dt;
+        if shift == Vec2::ZERO {
+            return;
+        }
+        for point in &mut self.points[NOW..] {
+            point.set_ground(areas.keep_out(point.ground() + shift));
+        }
+    }
+
     /// Moves on by one step: the past shifts, the root goes where the network sends it, and the
     /// future becomes what the network foresees.
     pub fn advance(&mut self, output: &Output, tuning: &Tuning, areas: &Areas, dt: f32) {
         let freedom = self.freedom(tuning);
         self.points.copy_within(1..=NOW, 0);
         let now = &mut self.points[NOW];
-        let moved = now.ground() + now.outward(output.root_velocity * (dt * freedom));
+        let step = now.outward(output.root_velocity * (dt * freedom));
+        // A stander's root is led, not only asked: its network has little to say about standing.
+        let stands = now.gait[STAND];
+        let step = self.sway.map_or(step, |wish| step.lerp(wish.velocity(0.0) * dt, stands));
+        let moved = now.ground() + step;
         let before = now.ground();
         now.set_ground(areas.keep_out(moved));
-        self.moved = (now.ground() - before) / dt;
+        self.moved = (now.ground() - before) / dt + self.carried;
         let turned = yaw(now.direction) + output.yaw_rate * dt * freedom;
         now.direction = Vec2::new(turned.sin(), turned.cos());
         let now = *now;

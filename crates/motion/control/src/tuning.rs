@@ -41,6 +41,12 @@ pub struct Tuning {
     /// How freely a standing character moves its root and its phase: 0 (as published) stops both,
     /// so that it freezes; 1 lets it breathe and shift its weight as its network foresees.
     pub stand_freedom: f32,
+    /// Share of a planted foot's slide that is taken off the root's movement: 0 (as published) moves
+    /// the root as the network says, 1 as its feet do.
+    pub foot_drive: f32,
+    /// How far a standing character's root is asked to wander about its place, metres; 0 (as
+    /// published): not at all.
+    pub sway: f32,
 }
 
 impl Default for Tuning {
@@ -60,6 +66,8 @@ impl Default for Tuning {
             speed_halflife: 1.0,
             speed_limit: [1.0, 1.0],
             stand_freedom: 0.0,
+            foot_drive: 0.0,
+            sway: 0.0,
         }
     }
 }
@@ -90,11 +98,16 @@ impl Tuning {
             && biases.clone().all(|b| b.is_finite() && *b > 0.0)
             && (least > 0.0 && least <= 1.0 && (1.0..=MOST).contains(&most))
             && (0.0..=1.0).contains(&self.stand_freedom)
+            && (0.0..=1.0).contains(&self.foot_drive)
+            && (0.0..=MOST_SWAY).contains(&self.sway)
     }
 }
 
 /// Greatest factor on the asked speed that makes sense; more is a mistake.
 const MOST: f32 = 10.0;
+
+/// Nobody stands and wanders farther, metres.
+const MOST_SWAY: f32 = 0.2;
 
 /// Share of the way to a target that `dt` covers at a half-life; 1 at half-life 0.
 pub fn share(halflife: f32, dt: f32) -> f32 {
@@ -124,6 +137,7 @@ mod tests {
             Tuning { gait_halflife: f32::NAN, ..tuning },
             Tuning { speed_halflife: -1.0, ..tuning },
             Tuning { stand_freedom: 1.5, ..tuning },
+            Tuning { sway: -0.1, ..tuning },
             Tuning { position_bias: [0.0, 1.0], ..tuning },
             limit([1.1, 1.3]),
             limit([0.8, 0.9]),

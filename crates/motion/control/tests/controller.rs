@@ -613,3 +613,49 @@ fn a_walk_has_a_golden_hash() {
     }
     assert_eq!(format!("{hash:016x}"), "5de618f7658817c6");
 }
+
+fn gone(tuning: Tuning, velocity: Vec2, seconds: u32) -> f32 {
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let mut character = Controller::new(model(), tuning, Vec2::ZERO, 0.0, &world).unwrap();
+    let intent = Intent { velocity, ..Intent::default() };
+    let mut way = 0.0;
+    let mut before = character.root().position;
+    for _ in 0..seconds * 60 {
+        character.step(STEP, &intent, &world);
+        way += character.root().position.distance(before);
+        before = character.root().position;
+    }
+    way
+}
+
+/// The follower's feet never leave the ground and slide along with it: driven by them it goes
+/// slower, but no slower than the floor that keeps any network going; and asks for more speed.
+#[test]
+fn planted_feet_hold_the_root_back() {
+    let ahead = Vec2::new(0.0, 1.0);
+    let free = gone(Tuning::default(), ahead, 6);
+    let driven = Tuning { foot_drive: 0.5, ..Tuning::default() };
+    let held = gone(driven, ahead, 6);
+    assert!(held < 0.75 * free && held > 0.6 * free, "{held} of {free}");
+    let corrected = Tuning { speed_limit: [0.7, 1.5], speed_halflife: 0.5, ..driven };
+    let reached = gone(corrected, ahead, 12) - gone(corrected, ahead, 6);
+    assert!((reached / 6.0 - 1.0).abs() < 0.05, "{reached} m in 6 s");
+}
+
+#[test]
+fn a_stander_sways_and_stays() {
+    let tuning = Tuning { sway: 0.04, stand_freedom: 1.0, ..Tuning::default() };
+    let areas = Areas::default();
+    let world = World { terrain: &Flat(0.0), areas: &areas };
+    let place = Vec2::new(2.0, 3.0);
+    let mut character = Controller::new(model(), tuning, place, 0.0, &world).unwrap();
+    let mut farthest = 0.0f32;
+    for _ in 0..60 * 60 {
+        character.step(STEP, &Intent::default(), &world);
+        let at = character.root().position;
+        farthest = farthest.max(Vec2::new(at.x, at.z).distance(place));
+    }
+    assert!(farthest > 0.02 && farthest < 0.12, "{farthest} m from its place");
+    assert!(gone(Tuning::default(), Vec2::ZERO, 3) < 1e-6, "as published: frozen");
+}

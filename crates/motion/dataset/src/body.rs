@@ -1,5 +1,8 @@
 //! The joints that labels and features need, by role.
 
+use std::iter::Sum;
+use std::ops::Sub;
+
 use ambulo_rig::{Roles, Skeleton};
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +108,12 @@ impl Body {
             arms: if names.arms.is_empty() { None } else { Some(pair("arms", &names.arms)?) },
             head: if names.head.is_empty() { None } else { Some(joint("head", &names.head)?) },
         })
+    }
+
+    /// From right to left over thighs and upper arms, for places of joints.
+    pub fn across<V: Sum + Sub<Output = V>>(&self, place: impl Fn(usize) -> V) -> V {
+        let pairs = [Some(self.thighs), self.arms].into_iter().flatten();
+        pairs.map(|[left, right]| place(left) - place(right)).sum()
     }
 
     /// Left heel, left toe, right heel, right toe: the order of the contacts.

@@ -27,8 +27,9 @@ use crate::{DatasetError, Load, Progress};
 
 /// Version of the index.
 pub const DATASET_FORMAT: u32 = 1;
-/// Part of every shard's key: another number builds all shards anew.
-const BUILDER: u32 = 1;
+/// Part of every shard's key, as the package's version is: another number builds all shards anew.
+/// Count it up whenever rows change.
+const BUILDER: u32 = 2;
 /// Ground is fitted to stretches of at most this long, seconds.
 const LONGEST_FIT: f32 = 3.0;
 /// Frames around a stretch whose feet count for its ground, as published.
@@ -120,7 +121,7 @@ pub fn setup(folder: &Path, manifest: &Manifest, load: &Load<'_>) -> Result<Setu
     let reference = reference.or(manifest.clips.first()).ok_or_else(|| {
         DatasetError::Manifest("the manifest names no clip; give motion files to build from".into())
     })?;
-    let file = manifest.path(folder, &reference.file);
+    let file = folder.join(&reference.file);
     let clip_error = |reason: String| DatasetError::Clip { file: file.clone(), reason };
     let loaded = load(&file).map_err(clip_error)?;
     let axes = Axes::named(&reference.axes).map_err(|e| clip_error(e.to_string()))?;
@@ -149,7 +150,7 @@ fn patches(folder: &Path, manifest: &Manifest) -> Result<Option<Patches>, Datase
         TerrainSource::Files => {
             let mut maps = vec![];
             for file in &terrain.files {
-                let path = manifest.path(folder, file);
+                let path = folder.join(file);
                 let text = std::fs::read_to_string(&path);
                 let text = text.map_err(|error| DatasetError::Io(path.clone(), error))?;
                 let map = HeightField::from_text(&text, terrain.cell, terrain.scale);
@@ -168,20 +169,24 @@ fn patches(folder: &Path, manifest: &Manifest) -> Result<Option<Patches>, Datase
     }
 }
 
-/// Fingerprint of everything that all shards depend on.
+/// Fingerprint of everything that all shards depend on; what only says which shards there are, or
+/// what else is written about them, is left out.
 fn settings_key(folder: &Path, manifest: &Manifest, setup: &Setup) -> Result<u64, DatasetError> {
     let neutral = Manifest {
         clips: vec![],
         licence: String::new(),
         reference: String::new(),
+        axes: String::new(),
+        mirror: true,
         validation: 0.0,
         ..manifest.clone()
     };
     let mut text = neutral.to_text()?;
-    text += &format!("{BUILDER} {} {:?}", setup.layout.hash(), setup.skeleton);
+    let version = env!("CARGO_PKG_VERSION");
+    text += &format!("{BUILDER} {version} {} {:?}", setup.layout.hash(), setup.skeleton);
     let mut bytes = text.into_bytes();
     for file in &manifest.terrain.files {
-        bytes.extend(std::fs::read(manifest.path(folder, file)).unwrap_or_default());
+        bytes.extend(std::fs::read(folder.join(file)).unwrap_or_default());
     }
     Ok(fingerprint(&bytes))
 }
@@ -194,14 +199,19 @@ impl Builder<'_> {
     /// Builds the shards of one clip, or finds them built.
     fn entry(&self, index: usize) -> Result<Vec<(Shard, ShardInfo, bool)>, DatasetError> {
         let entry = &self.manifest.clips[index];
-        let file = self.manifest.path(self.folder, &entry.file);
+        let file = self.folder.join(&entry.file);
         let clip_error = |reason: String| DatasetError::Clip { file: file.clone(), reason };
         let own = self.folder.join("labels").join(format!("{}.txt", entry.name));
         let labels = LabelFiles::read(&file, &own).map_err(clip_error)?;
         let bytes = std::fs::read(&file).map_err(|e| DatasetError::Io(file.clone(), e))?;
         let mut key = fingerprint(&bytes) ^ fingerprint(&labels.bytes).rotate_left(17);
         drop(bytes);
-        let neutral = ClipEntry { split: Split::Training, take: String::new(), ..entry.clone() };
+        let neutral = ClipEntry {
+            split: Split::Training,
+            take: String::new(),
+            mirror: None,
+            ..entry.clone()
+        };
         let described = serde_json::to_string(&neutral).expect("an entry is plain data");
         key ^=
             fingerprint(described.as_bytes()).rotate_left(31) ^ self.settings_key.rotate_left(47);
@@ -214,7 +224,7 @@ impl Builder<'_> {
             let shard = Shard { name, entry: index, mirrored };
             let key = format!("{:016x}", key ^ u64::from(mirrored));
             if let Some(info) = self.found(&shard, &key) {
-                shards.push((shard, info, false));
+                shards.push((shard, without_moments(info), false));
                 continue;
             }
             if fitted.is_none() {
@@ -225,7 +235,8 @@ impl Builder<'_> {
             let (clip, fps) = fitted.as_ref().expect("just fitted");
             let ready = self.setup.label(clip, *fps, mirrored, &labels).map_err(clip_error)?;
             let info = self.write(&shard, key, &ready);
-            shards.push((shard, info.map_err(|e| DatasetError::Io(file.clone(), e))?, true));
+            let info = info.map_err(|e| DatasetError::Io(file.clone(), e))?;
+            shards.push((shard, without_moments(info), true));
         }
         Ok(shards)
     }
@@ -248,8 +259,8 @@ impl Builder<'_> {
         let (motion, labels, layout) = (&ready.motion, &ready.labels, &self.setup.layout);
         let entry = &self.manifest.clips[shard.entry];
         let body = Body::new(&self.setup.roles, &self.setup.skeleton).map_err(io::Error::other)?;
-        let mut encoder = Encoder::new(layout, motion, labels, &body);
         let kind = self.kind(entry, labels.contacts.level);
+        let mut encoder = Encoder::new(layout, ready, &body, kind == Kind::Flat);
         let usable = |frame: usize| encoder.reaches(frame) && labels.usable[frame];
         let spans = self.spans(kind, ready, usable);
         let copies = if kind == Kind::Flat && layout.name() != "holden" {
@@ -363,7 +374,10 @@ impl Builder<'_> {
         let mut moments = Moments::default();
         for (shard, info, _) in built {
             if self.manifest.clips[shard.entry].split == Split::Training && info.rows > 0 {
-                moments.merge(&info.moments);
+                let gone = || io::Error::other("somebody changed it while the index was written");
+                let again = self.found(shard, &info.key).ok_or_else(gone);
+                let [rows, _] = self.paths(shard);
+                moments.merge(&again.map_err(|e| DatasetError::Io(rows, e))?.moments);
             }
         }
         if moments.rows == 0 {
@@ -434,6 +448,11 @@ impl Builder<'_> {
             "agreement": info.agreement,
         })
     }
+}
+
+/// Ten kilobytes a shard are too much to keep for all of them: the index reads them once more.
+fn without_moments(info: ShardInfo) -> ShardInfo {
+    ShardInfo { moments: Moments::default(), ..info }
 }
 
 fn mean(values: &[f32]) -> f32 {

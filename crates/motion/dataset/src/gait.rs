@@ -42,7 +42,8 @@ const STAND: usize = 0;
 const WALK: usize = 1;
 const JOG: usize = 2;
 const RUN: usize = 3;
-const CROUCH: usize = 4;
+/// Crouching, in the order of [`GAITS`].
+pub const CROUCH: usize = 4;
 const JUMP: usize = 5;
 
 /// A frame with this much more flight than double support (its inverse) is surely jogging.

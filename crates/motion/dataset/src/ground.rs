@@ -152,6 +152,8 @@ fn solve(rows: &mut [Vec<f64>]) -> Option<Vec<f64>> {
 pub struct Soles {
     /// One point for each time that a sole stands: its mean place.
     down: Vec<Vec3>,
+    /// For how many frames.
+    frames: Vec<f32>,
     up: Vec<Vec3>,
     hips: Vec<Vec3>,
 }
@@ -175,6 +177,7 @@ impl Soles {
                 let count = stand.len() as f32;
                 let sum: Vec3 = stand.map(|at| point(frames.start + at)).sum();
                 gathered.down.push(sum / count);
+                gathered.frames.push(count);
             }
             // A third of the frames tell as much.
             let up = frames.clone().step_by(3).filter(|&frame| !contacts.soles[frame][index]);
@@ -189,10 +192,16 @@ impl Soles {
         &self.down
     }
 
-    /// The ground as the standing feet have it, if it is level.
+    /// The ground as the standing feet have it, if it is level: each frame counts alike.
     pub fn level(&self) -> f32 {
-        let sum: f32 = self.down.iter().map(|point| point.y).sum();
-        if self.down.is_empty() { 0.0 } else { sum / self.down.len() as f32 }
+        self.mean(|point| point.y)
+    }
+
+    /// Mean over the frames of the standing feet; 0 without any.
+    fn mean(&self, value: impl Fn(&Vec3) -> f32) -> f32 {
+        let terms = self.down.iter().zip(&self.frames);
+        let sum: f32 = terms.map(|(point, frames)| value(point) * frames).sum();
+        sum / self.frames.iter().sum::<f32>().max(1.0)
     }
 
     /// The grounds that fit best, the best first.
@@ -229,8 +238,7 @@ impl Soles {
     /// published errors are in centimetres; all terms are squares, so metres rank the same.
     fn error(&self, patch: Patch<'_>, middle: Vec2, kind: Kind, beside: &[(Vec2, Vec2)]) -> f32 {
         let height = |point: &Vec3| patch.height(ground(point) - middle);
-        let count = self.down.len() as f32;
-        let mean_patch = self.down.iter().map(height).sum::<f32>() / count;
+        let mean_patch = self.mean(height);
         let mean_foot = self.level();
         // How far the ground is above a point.
         let above = |point: &Vec3| (height(point) - mean_patch) - (point.y - mean_foot);
@@ -253,7 +261,7 @@ impl Soles {
     fn bent<'a>(&self, patch: Patch<'a>, middle: Vec2) -> Ground<'a> {
         let centres: Vec<Vec2> = self.down.iter().map(|point| ground(point) - middle).collect();
         let heights: Vec<f32> = centres.iter().map(|&at| patch.height(at)).collect();
-        let rise = self.level() - heights.iter().sum::<f32>() / heights.len() as f32;
+        let rise = self.mean(|point| point.y - patch.height(ground(point) - middle));
         let points = self.down.iter().zip(&heights);
         let residual: Vec<f32> = points.map(|(point, height)| point.y - height - rise).collect();
         Ground::Fitted { patch, middle, rise, bend: Bend::new(centres, &residual) }
@@ -275,7 +283,8 @@ mod tests {
         };
         let down: Vec<Vec3> = (0..8).map(step).collect();
         let up = down.windows(2).map(|w| w[0].midpoint(w[1]) + Vec3::Y * 0.2).collect();
-        Soles { hips: down.iter().map(|p| *p + Vec3::Y).collect(), down, up }
+        let hips = down.iter().map(|p| *p + Vec3::Y).collect();
+        Soles { hips, frames: vec![30.0; down.len()], down, up }
     }
 
     /// The kernel's scale matters: with one near zero the bend vanishes and feet hang in the air.

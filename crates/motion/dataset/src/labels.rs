@@ -23,6 +23,8 @@ pub struct Labels {
     pub gaits: Gaits,
     /// Whether a frame may be learned from.
     pub usable: Vec<bool>,
+    /// Whether the gaits are published ones.
+    pub published_gaits: bool,
     /// Share of steps with the same foot as the one before.
     pub repeats: f32,
     /// Found or given: seconds and side (0 left, 1 right).
@@ -58,12 +60,16 @@ impl Labels {
         let stands = standing(&contacts, &speeds(motion), sources.gaits.walk, fps);
         let mut phase = phase(&found, &stands, fps);
         let mut gaits = Gaits::find(motion, body, &contacts, sources.leg, sources.gaits);
+        let mut published_gaits = false;
         if let Some((published, rate)) = sources.published {
-            if !published.phase.is_empty() {
+            // Steps of one's own say that the published ones are not what is wanted.
+            let own = sources.given.is_some_and(|given| !given.steps.is_empty());
+            if !published.phase.is_empty() && !own {
                 phase = published.phase(motion.frames(), fps, rate, sources.mirrored);
             }
             if !published.gaits.is_empty() {
                 gaits = published.gaits(motion, rate);
+                published_gaits = true;
             }
         }
         let mut usable = phase.known.clone();
@@ -74,7 +80,7 @@ impl Labels {
         }
         let repeats = repeats(&found);
         let steps = found.iter().map(|step| (step.frame / fps, step.side)).collect();
-        Self { contacts, phase, gaits, usable, repeats, steps }
+        Self { contacts, phase, gaits, usable, published_gaits, repeats, steps }
     }
 
     /// The labels as a file that [`Given`] reads: to look at, and to copy from.

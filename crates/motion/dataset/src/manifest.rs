@@ -1,6 +1,7 @@
 //! What a data set is made from: a text file that people edit.
 
-use std::path::{Path, PathBuf};
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
 
 use ambulo_rig::Axes;
 use serde::{Deserialize, Serialize};
@@ -10,6 +11,7 @@ use crate::body::RoleNames;
 use crate::contacts::ContactSettings;
 use crate::gait::GaitSettings;
 use crate::ground::Kind;
+use crate::patches::MOST;
 
 /// The version that this code writes and reads.
 pub const MANIFEST_FORMAT: u32 = 1;
@@ -213,8 +215,10 @@ impl Manifest {
         if !(0.0..10.0).contains(&self.contacts.dwell) || !self.terrain.scale.is_finite() {
             return fail("contacts.dwell or terrain.scale is out of range".into());
         }
-        if !(1..=100).contains(&self.terrain.copies) || self.terrain.patches > 100_000 {
-            return fail("terrain.copies must be 1 to 100, terrain.patches at most 100000".into());
+        if !(1..=100).contains(&self.terrain.copies) || self.terrain.patches > MOST {
+            return fail(format!(
+                "terrain.copies must be 1 to 100, terrain.patches at most {MOST}"
+            ));
         }
         if ![0, 4].contains(&self.foot_heights.len())
             || self.foot_heights.iter().any(|h| h.is_nan() || h.abs() >= 1.0)
@@ -225,7 +229,7 @@ impl Manifest {
     }
 
     fn check_clips(&self) -> Result<(), DatasetError> {
-        let mut names = std::collections::HashSet::new();
+        let (mut names, mut sides) = (HashSet::new(), HashMap::new());
         for clip in &self.clips {
             let fail = |message: &str| {
                 Err(DatasetError::Manifest(format!("clip '{}': {message}", clip.name)))
@@ -234,7 +238,11 @@ impl Manifest {
             if clip.name.is_empty() || clip.name.starts_with('.') || !clip.name.chars().all(plain) {
                 return fail("its name must be letters, digits, '-', '_', '.', '+' or blanks");
             }
-            if !names.insert(&clip.name) {
+            if [".auto", ".mirrored"].iter().any(|end| clip.name.ends_with(end)) {
+                return fail("names that end in .auto or .mirrored are given to other files");
+            }
+            // Not every file system tells capitals from small letters.
+            if !names.insert(clip.name.to_lowercase()) {
                 return fail("two clips have this name");
             }
             if let Err(error) = Axes::named(&clip.axes) {
@@ -244,17 +252,11 @@ impl Manifest {
             if !(from >= 0.0 && to > from) {
                 return fail("it ends before it begins");
             }
-            let sides = self.clips.iter().filter(|other| other.take == clip.take);
-            if sides.clone().any(|other| other.split != clip.split) {
+            if *sides.entry(&clip.take).or_insert(clip.split) != clip.split {
                 return fail(&format!("take '{}' is on both sides of the split", clip.take));
             }
         }
         Ok(())
-    }
-
-    /// Where a clip's file is, for a manifest in a folder.
-    pub fn path(&self, folder: &Path, file: &Path) -> PathBuf {
-        folder.join(file)
     }
 }
 
@@ -302,5 +304,9 @@ mod tests {
         assert!(manifest.check().unwrap_err().to_string().contains("two clips"));
         manifest.clips[1] = entry("../up", "u", Split::Training);
         assert!(manifest.check().unwrap_err().to_string().contains("name must be"));
+        manifest.clips[1] = entry("A", "u", Split::Training);
+        assert!(manifest.check().unwrap_err().to_string().contains("two clips"));
+        manifest.clips[1] = entry("a.mirrored", "u", Split::Training);
+        assert!(manifest.check().unwrap_err().to_string().contains(".mirrored"));
     }
 }

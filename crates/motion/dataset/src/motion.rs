@@ -1,7 +1,7 @@
 //! A clip made ready: metres, Ambulo's axes, the layout's frame rate, world transforms, and the
 //! root on the ground that everything is seen from.
 
-use ambulo_rig::glam::{DVec3, Quat, Vec2, Vec3};
+use ambulo_rig::glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 use ambulo_rig::{Axes, Clip, Mirror, MirrorError, Pose, Skeleton, Transform};
 
 use crate::body::Body;
@@ -77,12 +77,7 @@ impl Motion {
 
     fn find_roots(&self, body: &Body) -> Vec<Root> {
         let across = |frame: usize| {
-            let pairs = [Some(body.thighs), body.arms];
-            let across = pairs
-                .into_iter()
-                .flatten()
-                .map(|[left, right]| self.position(frame, left) - self.position(frame, right));
-            let across = across.sum::<Vec3>();
+            let across = body.across(|joint| self.position(frame, joint));
             Vec2::new(-across.z, across.x).normalize_or_zero()
         };
         let facings: Vec<Vec2> = (0..self.frames()).map(across).collect();
@@ -196,10 +191,30 @@ pub fn leg_length(skeleton: &Skeleton, body: &Body) -> f64 {
 ///
 /// # Errors
 /// When neither names nor shape tell the partners.
-pub fn mirrored(clip: &Clip) -> Result<Clip, MirrorError> {
-    let mirror = Mirror::by_name(clip, DVec3::X).or_else(|error| match error {
-        MirrorError::NoNames => Mirror::by_geometry(clip, DVec3::X),
+pub fn mirrored(clip: &Clip, body: &Body) -> Result<Clip, MirrorError> {
+    let facing = facing_forward(clip, body);
+    let mirror = Mirror::by_name(&facing, DVec3::X).or_else(|error| match error {
+        MirrorError::NoNames => Mirror::by_geometry(&facing, DVec3::X),
         _ => Err(error),
     })?;
     mirror.apply(clip)
+}
+
+/// A few dozen frames of a clip, turned so that all of them face +Z. How a joint's own frame is
+/// reflected is chosen by its usual rotation, and partners by shape across the plane of X: neither
+/// may depend on where a clip happens to walk, or one data set holds two kinds of mirrored hips.
+fn facing_forward(clip: &Clip, body: &Body) -> Clip {
+    let (mut translations, mut rotations, mut places) = (vec![], vec![], vec![]);
+    for frame in (0..clip.frames()).step_by(clip.frames().div_ceil(64)) {
+        clip.positions(frame, &mut places);
+        let across = body.across(|joint| places[joint]);
+        let first = rotations.len();
+        rotations.extend_from_slice(clip.rotations(frame));
+        rotations[first] = DQuat::from_rotation_y(across.z.atan2(across.x)) * rotations[first];
+        translations.extend_from_slice(clip.translations(frame));
+    }
+    let moving = clip.moving().to_vec();
+    let turned =
+        Clip::new(clip.skeleton().clone(), clip.frame_time(), moving, translations, rotations);
+    turned.expect("some frames of a clip are one")
 }

@@ -11,6 +11,8 @@ use crate::random::Random;
 const SIDE: usize = 128;
 /// Metres between heights of the patches that are made from noise: 10 m a side.
 const NOISE_CELL: f32 = 0.08;
+/// Most pieces: 0.66 GB of them.
+pub const MOST: usize = 10_000;
 /// Steepest piece of a height map that is taken, metres from its mean: 50 px of the published maps.
 const HIGHEST: f32 = 50.0 * 3.0 * 0.01;
 
@@ -30,7 +32,7 @@ pub struct Patch<'a> {
 
 impl Patches {
     /// Random cuts of height maps: anywhere, mirrored and turned at random, those that rise too
-    /// high left out. One trial for each 225 heights of a map.
+    /// high left out. One trial for each 225 heights of a map, as long as there are not too many.
     ///
     /// Source: section 4.2 of the PFNN paper and its published procedure; ours draws its cuts from
     /// another random generator and cuts by sampling instead of shifting a reflected copy.
@@ -40,7 +42,7 @@ impl Patches {
         let cell = maps.first().map_or(NOISE_CELL, HeightField::cell);
         for map in maps {
             let (rows, columns) = map.size();
-            for _ in 0..(rows * columns / 225).max(1) {
+            for _ in 0..(rows * columns / 225).clamp(1, (MOST / maps.len()).max(1)) {
                 let half = Vec2::new(columns as f32, rows as f32) * (0.5 * map.cell());
                 let middle =
                     Vec2::new(random.uniform(-half.x, half.x), random.uniform(-half.y, half.y));

@@ -1,6 +1,6 @@
 //! Looking at motion files before anything is built: a manifest that a person can read and edit.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use ambulo_features::Layout;
@@ -17,6 +17,10 @@ use crate::{DatasetError, Load, Progress};
 
 /// A stander's ankle and ball of the foot, where a recording does not tell; metres.
 const USUAL_HEIGHTS: [f32; 4] = [0.09, 0.02, 0.09, 0.02];
+/// What the PFNN's authors take both for; their layout means ground that lies so far below.
+const PUBLISHED_HEIGHTS: [f32; 4] = [0.05, 0.04, 0.05, 0.04];
+/// What mirrored files are called, beside the ones that they mirror.
+const MIRRORED: [&str; 2] = ["_mirrored", "_mirror"];
 
 /// A manifest, and what should be said about it.
 #[derive(Clone, Debug)]
@@ -32,11 +36,9 @@ struct Seen {
     axes: String,
     tree: u64,
     seconds: f64,
-    roles: Option<RoleNames>,
-    role_error: String,
-    frames: usize,
+    roles: RoleNames,
     level: bool,
-    floors: Option<[f32; 4]>,
+    floors: [f32; 4],
 }
 
 /// Looks at files and describes a data set of them; `settings` is a manifest without clips.
@@ -44,7 +46,7 @@ struct Seen {
 /// Names of clips are the files' own; paths are relative to `folder` where they can be.
 ///
 /// # Errors
-/// Files that cannot be read at all, roles that cannot be found, no file that can be used.
+/// No file that can be used (why, file by file), or a wish to stop.
 pub fn plan(
     files: &[PathBuf],
     folder: &Path,
@@ -88,16 +90,14 @@ pub fn plan(
     let Some((first, seen)) = kept.first() else {
         return Err(DatasetError::NoClips(listed(&skipped)));
     };
-    let roles = seen.roles.clone();
-    manifest.roles = roles.ok_or_else(|| DatasetError::Clip {
-        file: (*first).clone(),
-        reason: seen.role_error.clone(),
-    })?;
+    manifest.roles = seen.roles.clone();
     if manifest.reference.is_empty() {
         manifest.reference = stem(first);
     }
     if manifest.foot_heights.is_empty() {
-        manifest.foot_heights = foot_heights(&kept).to_vec();
+        let published = settings.layout == "holden";
+        let heights = if published { PUBLISHED_HEIGHTS } else { foot_heights(&kept) };
+        manifest.foot_heights = heights.to_vec();
     }
     manifest.clips = entries(&kept, folder, &manifest);
     Ok(Planned { manifest, skipped })
@@ -108,8 +108,7 @@ fn without_mirrors(files: &[PathBuf], mirror: bool) -> (Vec<PathBuf>, Vec<(PathB
     let (mut kept, mut skipped) = (vec![], vec![]);
     for file in files {
         let name = stem(file);
-        let bases = ["_mirror", "_mirrored", ".mirrored"].iter();
-        let base = bases.filter_map(|end| name.strip_suffix(end)).next();
+        let base = MIRRORED.iter().find_map(|end| name.strip_suffix(end));
         match base.filter(|base| mirror && files.iter().any(|other| stem(other) == *base)) {
             Some(base) => skipped.push((file.clone(), format!("{base} is mirrored already"))),
             None => kept.push(file.clone()),
@@ -132,7 +131,11 @@ fn size(file: &Path) -> f64 {
 fn stem(file: &Path) -> String {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     let plain = |c: char| if c.is_alphanumeric() || "-_. +".contains(c) { c } else { '_' };
-    let name: String = stem.trim_start_matches('.').chars().map(plain).collect();
+    let mut name: String = stem.trim_start_matches('.').chars().map(plain).collect();
+    // These endings are given to other files of the data set.
+    if let Some(at) = name.rfind('.').filter(|&at| [".auto", ".mirrored"].contains(&&name[at..])) {
+        name.replace_range(at..=at, "_");
+    }
     if name.is_empty() { "clip".into() } else { name }
 }
 
@@ -140,7 +143,10 @@ fn look(file: &Path, settings: &Manifest, fps: f64, load: &Load<'_>) -> Result<S
     let loaded = load(file)?;
     let axes = if settings.axes.is_empty() {
         loaded.axes.map_err(|why| {
-            format!("{why}; name its axes: a --config file with axes = \"cm\", for instance")
+            format!(
+                "{why}; if you know better, name its axes in a --config file: axes = \"ambulo\" \
+                 (metres, Y up, Z ahead), \"cm\" or another that `motion convert --help` lists"
+            )
         })?
     } else {
         settings.axes.clone()
@@ -150,38 +156,20 @@ fn look(file: &Path, settings: &Manifest, fps: f64, load: &Load<'_>) -> Result<S
     let found = settings.roles.found_in(clip.skeleton());
     let by_name = Roles::by_name(clip.skeleton());
     let found = found.or(by_name).or(Roles::by_shape(&clip, up.up.vector()));
-    let (roles, role_error) = match RoleNames::of(&hips_below_roots(found, &clip), clip.skeleton())
-    {
-        Ok(roles) => (Some(roles), String::new()),
-        Err(why) => (None, why),
-    };
-    let hips = roles.as_ref().map_or_else(String::new, |roles| roles.hips.clone());
-    let fitting = Fitting { axes: up, hips: &hips, drop: &settings.drop, fps };
-    let mut seen = Seen {
-        axes,
-        tree: 0,
-        seconds: clip.duration(),
-        roles,
-        role_error,
-        frames: clip.frames(),
-        level: false,
-        floors: None,
-    };
-    let Some(roles) = &seen.roles else { return Ok(seen) };
+    let roles = RoleNames::of(&hips_below_roots(found, &clip), clip.skeleton())?;
+    let fitting = Fitting { axes: up, hips: &roles.hips, drop: &settings.drop, fps };
     let fitted = fitting.fit(&clip)?;
-    seen.frames = fitted.frames();
     if fitted.frames() < 2 * ambulo_features::WINDOW + 2 {
         let seconds = fitted.duration();
         return Err(format!(
             "{seconds:.2} s are too short: a row needs a second before and after it"
         ));
     }
-    seen.tree = tree_of(&fitted);
-    let body = Body::new(roles, fitted.skeleton())?;
+    let body = Body::new(&roles, fitted.skeleton())?;
     let motion = Motion::new(&fitted, &body);
     let contacts = Contacts::find(&motion, &body, &settings.contacts);
-    (seen.level, seen.floors) = (contacts.level, Some(contacts.floors));
-    Ok(seen)
+    let (tree, seconds) = (tree_of(&fitted), clip.duration());
+    Ok(Seen { axes, tree, seconds, roles, level: contacts.level, floors: contacts.floors })
 }
 
 /// The joint called root is not the hips if the legs hang on a joint below it.
@@ -210,21 +198,24 @@ fn tree_of(clip: &Clip) -> u64 {
 /// Medians over the clips on level ground.
 fn foot_heights(kept: &[(&PathBuf, Seen)]) -> [f32; 4] {
     std::array::from_fn(|sole| {
-        let floors = kept.iter().filter(|(_, seen)| seen.level).filter_map(|(_, seen)| seen.floors);
-        let median = quantile(floors.map(|floors| floors[sole]).collect(), 0.5);
+        let level = kept.iter().filter(|(_, seen)| seen.level);
+        let median = quantile(level.map(|(_, seen)| seen.floors[sole]).collect(), 0.5);
         let height = median.filter(|height| (0.0..0.25).contains(height));
         (height.unwrap_or(USUAL_HEIGHTS[sole]) * 1000.0).round() / 1000.0
     })
 }
 
 /// Recording that a file is cut from, by its name: up to a `subject` or `take` with its number, else
-/// without trailing numbers.
+/// without trailing numbers. Its mirror image is of the same recording.
 fn take(name: &str) -> String {
-    let lower = name.to_lowercase();
+    let name = MIRRORED.iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
+    let lower = name.to_ascii_lowercase();
     for mark in ["subject", "take"] {
-        if let Some(at) = lower.find(mark) {
-            let digits = lower[at + mark.len()..].bytes().take_while(u8::is_ascii_digit).count();
-            return name.chars().take(at + mark.len() + digits).collect();
+        if let Some(end) = lower.find(mark).map(|at| at + mark.len()) {
+            let digits = lower[end..].bytes().take_while(u8::is_ascii_digit).count();
+            if digits > 0 {
+                return name[..end + digits].into();
+            }
         }
     }
     let base = name.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -236,14 +227,14 @@ fn take(name: &str) -> String {
 fn entries(kept: &[(&PathBuf, Seen)], folder: &Path, manifest: &Manifest) -> Vec<ClipEntry> {
     let takes: Vec<String> = kept.iter().map(|(file, _)| take(&stem(file))).collect();
     let held = validation(&takes, kept, manifest);
-    let mut used: HashMap<String, usize> = HashMap::new();
+    let mut used = HashSet::new();
+    let mut unused = |name: String| {
+        let numbered = (2..).map(|number| format!("{name}-{number}"));
+        let mut names = std::iter::once(name.clone()).chain(numbered);
+        names.find(|name| used.insert(name.to_lowercase())).expect("numbers do not end")
+    };
     let entry = |((file, seen), take): (&(&PathBuf, Seen), &String)| {
-        let mut name = stem(file);
-        let times = used.entry(name.clone()).or_default();
-        *times += 1;
-        if *times > 1 {
-            name = format!("{name}-{times}");
-        }
+        let name = unused(stem(file));
         let split = if held.contains(take) { Split::Validation } else { Split::Training };
         let (take, axes) = (take.clone(), seen.axes.clone());
         let file = relative(file, folder);
@@ -264,7 +255,8 @@ fn entries(kept: &[(&PathBuf, Seen)], folder: &Path, manifest: &Manifest) -> Vec
 
 /// Takes for validation: in an order that the seed decides, as long as they fit into the share.
 fn validation(takes: &[String], kept: &[(&PathBuf, Seen)], manifest: &Manifest) -> Vec<String> {
-    let mut seconds: HashMap<&String, f64> = HashMap::new();
+    // In an order of its own: a sum must not depend on chance.
+    let mut seconds: BTreeMap<&String, f64> = BTreeMap::new();
     for (take, (_, seen)) in takes.iter().zip(kept) {
         *seconds.entry(take).or_default() += seen.seconds;
     }
@@ -314,6 +306,9 @@ mod tests {
             ("dataset-2_walk-turn-left_normal_001", "dataset-2_walk-turn-left_normal"),
             ("02_01", "02_01"),
             ("dog", "dog"),
+            ("LocomotionFlat04_000_mirror", "LocomotionFlat04"),
+            ("größe_Subject2_b", "größe_Subject2"),
+            ("mistake_by_a_subject_03", "mistake_by_a_subject"),
         ] {
             assert_eq!(take(name), expected, "{name}");
         }

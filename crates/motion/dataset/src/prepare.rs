@@ -191,12 +191,12 @@ impl Setup {
         mirror: bool,
         files: &LabelFiles,
     ) -> Result<Ready, String> {
+        let body = Body::new(&self.roles, fitted.clip.skeleton())?;
         let clip = if mirror {
-            mirrored(&fitted.clip).map_err(|e| format!("cannot be mirrored: {e}"))?
+            mirrored(&fitted.clip, &body).map_err(|e| format!("cannot be mirrored: {e}"))?
         } else {
             fitted.clip.clone()
         };
-        let body = Body::new(&self.roles, clip.skeleton())?;
         let mut motion = Motion::new(&clip, &body);
         let contacts = Contacts::find(&motion, &body, &self.contacts);
         if contacts.level {

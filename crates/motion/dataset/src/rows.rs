@@ -8,6 +8,7 @@ use ambulo_rig::{Flat, Terrain};
 
 use crate::body::Body;
 use crate::filter::stretches;
+use crate::gait::CROUCH;
 use crate::labels::Labels;
 use crate::motion::{Motion, Root};
 use crate::prepare::{Ready, Setup};
@@ -27,15 +28,19 @@ pub struct Encoder<'a> {
     motion: &'a Motion,
     labels: &'a Labels,
     soles: [usize; 4],
+    crouching_head: Option<usize>,
     input: Input,
     output: Output,
 }
 
 impl<'a> Encoder<'a> {
-    /// For a motion and its labels.
-    pub fn new(layout: &'a Layout, motion: &'a Motion, labels: &'a Labels, body: &Body) -> Self {
+    /// For a labelled motion; `level` if it was captured on a level floor.
+    pub fn new(layout: &'a Layout, ready: &'a Ready, body: &Body, level: bool) -> Self {
+        let (motion, labels) = (&ready.motion, &ready.labels);
         let (input, output) = (Input::zero(motion.joints()), Output::zero(motion.joints()));
-        Self { layout, motion, labels, soles: body.soles(), input, output }
+        let by_head = layout.name() == "holden" && level && labels.published_gaits;
+        let crouching_head = body.head.filter(|_| by_head);
+        Self { layout, motion, labels, soles: body.soles(), crouching_head, input, output }
     }
 
     /// Numbers of a row.
@@ -72,6 +77,10 @@ impl<'a> Encoder<'a> {
             let height = |at: Vec2| ground.height(at.x, at.y);
             let place = there.position;
             self.input.ground[sample].gait = self.labels.gaits.shares[at];
+            if let Some(head) = self.crouching_head {
+                let height = motion.position(at, head).y;
+                self.input.ground[sample].gait[CROUCH] = published_crouch(height);
+            }
             self.input.ground[sample].height =
                 [height(place + left), height(place), height(place - left)];
         }
@@ -118,6 +127,12 @@ impl<'a> Encoder<'a> {
     }
 }
 
+/// The share of crouching that the PFNN's authors give to recordings on a level floor instead of a
+/// hand-made one: 0 with the head above 1.3 m, 1 below 0.8 m. It need not sum to 1 with the others.
+fn published_crouch(head: f32) -> f32 {
+    1.0 - ((head - 0.8) / 0.5).clamp(0.0, 1.0)
+}
+
 /// All rows of one clip on level ground, in memory.
 #[derive(Clone, Debug)]
 pub struct ClipRows {
@@ -135,7 +150,8 @@ pub struct ClipRows {
 /// When roles are missing, or no frame can be used.
 pub fn encode_clip(setup: &Setup, ready: &Ready) -> Result<ClipRows, String> {
     let body = Body::new(&setup.roles, &setup.skeleton)?;
-    let mut encoder = Encoder::new(&setup.layout, &ready.motion, &ready.labels, &body);
+    let level = ready.labels.contacts.level;
+    let mut encoder = Encoder::new(&setup.layout, ready, &body, level);
     let usable = |frame: usize| encoder.reaches(frame) && ready.labels.usable[frame];
     let spans = stretches(ready.motion.frames(), usable);
     let width = Encoder::width(&setup.layout);

@@ -197,6 +197,22 @@ impl Layout {
         self.units_per_metre
     }
 
+    /// Seconds that velocities and rates count in: one, or the time of a frame.
+    pub fn rate_time(&self) -> f32 {
+        match self.rates {
+            Rates::Second => 1.0,
+            Rates::Frame => 1.0 / self.fps,
+        }
+    }
+
+    /// What the yaw's rate is multiplied by to be positive to the character's left.
+    pub fn yaw_sign(&self) -> f32 {
+        match self.rates {
+            Rates::Second => 1.0,
+            Rates::Frame => -1.0,
+        }
+    }
+
     /// Blocks of the input vector, in order.
     pub fn inputs(&self) -> &[Block] {
         &self.inputs

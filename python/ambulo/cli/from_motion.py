@@ -1,0 +1,46 @@
+"""Training straight from motion files: the data set is made on the way."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import click
+
+from ambulo.cli.dataset import MANIFEST, build_dataset, found_licence, plan_dataset
+from ambulo.cli.motion import SUFFIXES, motion_files
+from ambulo.files import write_atomic
+
+
+def data_folder(folder: Path, output: Path, licence: str | None, *, dry_run: bool) -> Path:
+    """The data set in a folder, or one made beside the model from the motion files there.
+
+    What is there of it already is kept: it goes on where it was stopped.
+    """
+    if not folder.is_dir() or (folder / "dataset.json").is_file() or (folder / MANIFEST).is_file():
+        return folder
+    if not any(path.suffix.lower() in SUFFIXES for path in folder.rglob("*")):
+        return folder
+    target = output.with_suffix(".data")
+    if dry_run:
+        raise click.UsageError(
+            f"{folder} holds motion files: `ambulo dataset build {folder} -o {target} --dry-run` "
+            "says what would be made of them, --dry-run here needs the data set"
+        )
+    manifest = target / MANIFEST
+    if not manifest.exists():
+        words = licence if licence is not None else found_licence([folder])
+        settings = f"licence = {json.dumps(words)}\n"
+        text, skipped = plan_dataset(list(motion_files(folder)), target, settings, _threads())
+        for path, reason in skipped:
+            click.echo(f"left out {path}: {reason}", err=True)
+        target.mkdir(parents=True, exist_ok=True)
+        write_atomic(manifest, text)
+    report = build_dataset(target, manifest.read_text(encoding="utf-8"), _threads())
+    click.echo(f"{target}: {report['rows'][0]} rows for training", err=True)
+    return target
+
+
+def _threads() -> int:
+    return os.cpu_count() or 1
