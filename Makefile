@@ -79,7 +79,7 @@ STARTER := out/starter
 starter: setup ## Make starters/human.safetensors anew (minutes)
 	$(call say,Making the starter motion and the starter model)
 	$(BIN)/ambulo starter motion -o $(STARTER)/motion --overwrite
-	$(BIN)/ambulo dataset build $(STARTER)/motion -o $(STARTER)/data --overwrite \
+	$(BIN)/ambulo dataset build $(STARTER)/motion -o $(STARTER)/data --axes cm --overwrite \
 		--licence "MIT OR Apache-2.0: motion made by rule by Ambulo, nobody's recording"
 	$(BIN)/ambulo train $(STARTER)/data -o $(STARTER)/human.safetensors --preset starter --overwrite
 	@mkdir -p starters

@@ -17,10 +17,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ambulo import _core
+
 FORMAT = 1
-# Layouts whose velocities and phase rate count in frames, all others' in seconds; their yaw is that
-# of world → root, so that a positive rate turns away from +X.
-PER_FRAME = ("holden",)
 COLUMNS = (("phase", 1), ("category", 1), ("root", 4))
 SPLITS = ("training", "validation")
 
@@ -100,12 +99,16 @@ class Dataset:
     @property
     def frame(self) -> float:
         """One frame in the unit that the layout's velocities count in."""
-        return 1.0 if self.layout["name"] in PER_FRAME else 1.0 / self.fps
+        return 1.0 / (self.fps * self._table["rate_time"])
 
     @property
     def turn(self) -> float:
         """1 where a positive yaw rate turns towards +X, −1 where it turns away."""
-        return -1.0 if self.layout["name"] in PER_FRAME else 1.0
+        return self._table["yaw_sign"]
+
+    @property
+    def _table(self) -> Any:
+        return _core.layout(self.layout["name"], len(self.joints))
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -177,9 +177,9 @@ _HIDDEN = [
 # Each names what it starts from (`base`) and what it changes.
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {
-        "about": "a few minutes on two cores for an hour of capture",
-        "hidden": [384, 384],
-        "steps": 12000,
+        "about": "some minutes on two cores for half an hour of capture",
+        "hidden": [512, 512],
+        "steps": 14000,
         "noise": 0.1,
         "phase_noise": 0.02,
         "balance": 0.6,
@@ -194,7 +194,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "root_noise": 0.05,
         "past_warp": 0.1,
         "implied": 0.008,
-        "planted": 0.01,
+        "planted": 0.02,
         "weigh": "blocks",
         "block_weights": {
             "root_yaw": 0.5,
@@ -215,9 +215,12 @@ PRESETS: dict[str, dict[str, Any]] = {
         ],
         "tuning": {
             "pose_halflife": 0.0,
+            "velocity_halflife": 0.12,
+            "facing_halflife": 0.08,
             "stand_freedom": 1.0,
             "sway": 0.045,
-            "foot_drive": 0.55,
+            "foot_drive": 0.4,
+            "fastest_turn": 35.0,
             "speed_limit": [0.7, 1.5],
             "speed_halflife": 0.5,
         },
@@ -237,6 +240,19 @@ PRESETS: dict[str, dict[str, Any]] = {
     "starter": {
         "base": "default",
         "about": "the starter motion",
+        "hidden": [384, 384],
+        "steps": 12000,
+        "planted": 0.01,
+        "tuning": {
+            "pose_halflife": 0.008,
+            "facing_halflife": 0.08,
+            "stand_freedom": 1.0,
+            "sway": 0.03,
+            "foot_drive": 0.4,
+            "fastest_turn": 35.0,
+            "speed_limit": [0.85, 1.1],
+            "speed_halflife": 0.5,
+        },
     },
     "holden": {
         "about": "the published training: days on two cores",

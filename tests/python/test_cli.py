@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import runpy
 from collections.abc import Iterator
 
@@ -52,8 +53,10 @@ def test_errors_are_one_line_unless_debugging(tmp_path) -> None:
 def test_the_demo_needs_no_data(tmp_path, monkeypatch) -> None:
     """All of it but the length: less motion, hardly any training, no film."""
     monkeypatch.delenv("AMBULO_DATA", raising=False)
-    monkeypatch.setattr("ambulo.cli.demo.MINUTES", 0.5)
-    monkeypatch.setattr("ambulo.cli.character.write_outputs", lambda *_: [])
+    # By module: `ambulo.cli` has the commands under the same names.
+    monkeypatch.setattr(importlib.import_module("ambulo.cli.demo"), "MINUTES", 0.5)
+    character = importlib.import_module("ambulo.cli.character")
+    monkeypatch.setattr(character, "write_outputs", lambda *_: [])
     out = tmp_path / "out"
     run = CliRunner().invoke(cli, ["demo", "-o", str(out), "--steps", "3"])
     assert run.exit_code == 0, run.output

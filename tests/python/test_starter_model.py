@@ -5,6 +5,7 @@ import math
 import pytest
 
 from ambulo import Controller, load_model
+from ambulo.cli.demo import LICENCE
 from ambulo.starters import starter_model
 
 
@@ -16,7 +17,7 @@ def model():
 def test_it_is_small_and_free(model) -> None:
     assert starter_model().stat().st_size <= 6_000_000
     assert model.info()["precision"] == "float16"
-    assert "MIT OR Apache-2.0" in model.info()["licence"]
+    assert model.info()["licence"] == LICENCE, "as `make starter` states it"
     assert starter_model().with_name("human.md").is_file(), "its card"
 
 

@@ -6,7 +6,9 @@ use std::sync::Mutex;
 use ambulo_control as control;
 use ambulo_dataset::prepare::{LabelFiles, Setup};
 use ambulo_dataset::rows::{ClipRows, encode_clip};
-use ambulo_dataset::{DatasetError, Loaded, Manifest, RoleNames, build, plan};
+use ambulo_dataset::{
+    ContactSettings, DatasetError, GaitSettings, Loaded, Manifest, RoleNames, build, plan,
+};
 use ambulo_formats::detect::detect;
 use ambulo_formats::files::read_path;
 use ambulo_formats::{Positions, ReadOptions};
@@ -159,14 +161,25 @@ fn rows_for(
         Some(roles) => RoleNames::deserialize(roles).map_err(|e| e.to_string())?,
         None => RoleNames::of(&ambulo_rig::Roles::by_name(skeleton), skeleton)?,
     };
+    #[derive(Default, Deserialize)]
+    #[serde(default)]
+    struct HowLabelled {
+        drop: Vec<String>,
+        contacts: ContactSettings,
+        gaits: GaitSettings,
+    }
+    let labelled = match model.bundle().header().parts.get("labels") {
+        Some(labels) => HowLabelled::deserialize(labels).map_err(|e| e.to_string())?,
+        None => HowLabelled::default(),
+    };
     let setup = Setup {
         layout: model.layout().clone(),
         skeleton: skeleton.clone(),
         roles,
-        drop: vec![],
+        drop: labelled.drop,
         foot_heights: model.feet().heights,
-        contacts: Default::default(),
-        gaits: Default::default(),
+        contacts: labelled.contacts,
+        gaits: labelled.gaits,
     };
     let labels = path.with_extension("labels.txt");
     let labels = LabelFiles::read(path, &labels)?;

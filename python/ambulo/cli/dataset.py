@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from ambulo import _core
-from ambulo.cli.motion import motion_files
+from ambulo.cli.motion import AXES, motion_files
 from ambulo.cli.progress import bar
+from ambulo.data import open_dataset
 from ambulo.files import write_atomic
 
 MANIFEST = "manifest.toml"
@@ -42,6 +43,9 @@ def dataset() -> None:
 )  # fmt: skip
 @click.option("--licence", help="Licence of the recordings; models trained from them carry it.")
 @click.option(
+    "--axes", type=AXES, help="What all files are in. Default: found out for each of them."
+)
+@click.option(
     "--threads", type=click.IntRange(1, 1024), default=os.cpu_count() or 1, show_default=True,
     help="The result does not depend on it.",
 )  # fmt: skip
@@ -53,6 +57,7 @@ def build(
     output: Path,
     config: Path | None,
     licence: str | None,
+    axes: str | None,
     threads: int,
     dry_run: bool,
     overwrite: bool,
@@ -72,7 +77,7 @@ def build(
     """
     manifest = output / MANIFEST
     if manifest.exists() and not overwrite:
-        if config is not None or licence is not None:
+        if config is not None or licence is not None or axes is not None:
             raise click.UsageError(
                 f"{manifest} has the settings already: edit it, or --overwrite makes it anew"
             )
@@ -80,7 +85,7 @@ def build(
         clips = _checked(text, manifest)["clip"]
         _unnamed(clips, sources, output)
     else:
-        text, skipped = _planned(sources, output, config, licence, threads)
+        text, skipped = _planned(sources, output, config, licence, axes, threads)
         clips = _checked(text, manifest)["clip"]
     if dry_run:
         click.echo(text)
@@ -97,11 +102,27 @@ def build(
         return
     for name in report["empty"]:
         click.echo(f"{name}: no row can be used (too short, or no steps were found in it)")
+    _note(_checked(text, manifest), report)
     training, validation = report["rows"]
     click.echo(
         f"{output}: {training} rows for training and {validation} for validation from "
         f"{len(clips)} clips ({report['written']} shards written, {report['kept']} kept)"
     )
+
+
+def _note(manifest: dict[str, Any], report: dict[str, Any]) -> None:
+    """What a model made of this will lack."""
+    if not manifest["licence"].strip():
+        click.echo(
+            f"note: no licence is stated; set it in {MANIFEST} (or --licence): models carry it",
+            err=True,
+        )
+    if not report["rows"][1]:
+        click.echo(
+            "note: no clip is held out for validation (too few takes for the share); set "
+            f'split = "validation" for one in {MANIFEST}, or models are judged by what they learn',
+            err=True,
+        )
 
 
 def build_dataset(folder: Path, manifest: str, threads: int) -> dict[str, Any]:
@@ -136,7 +157,12 @@ def found_licence(sources: Sequence[Path]) -> str:
 
 
 def _planned(
-    sources: Sequence[Path], folder: Path, config: Path | None, licence: str | None, threads: int
+    sources: Sequence[Path],
+    folder: Path,
+    config: Path | None,
+    licence: str | None,
+    axes: str | None,
+    threads: int,
 ) -> tuple[str, list[tuple[Path, str]]]:
     if not sources:
         raise click.UsageError(f"{folder} has no {MANIFEST} yet: name motion files or folders")
@@ -145,9 +171,13 @@ def _planned(
     if _checked(settings, config or Path(MANIFEST))["licence"] == "":
         words = licence if licence is not None else found_licence(sources)
         # Keys of the top level come before any table.
-        settings = f"licence = {json.dumps(words)}\n" + _without(settings, "licence")
+        settings = f"licence = {json.dumps(words, ensure_ascii=False)}\n" + _without(
+            settings, "licence"
+        )
     elif licence is not None:
         raise click.UsageError(f"{config} states a licence already")
+    if axes is not None:
+        settings = f'axes = "{axes}"\n' + _without(settings, "axes")
     return plan_dataset(files, folder, settings, threads)
 
 
@@ -196,6 +226,7 @@ def info(folder: Path, each: bool, as_json: bool) -> None:
     path = folder / "dataset.json"
     if not path.is_file():
         raise click.ClickException(f"{folder} has no dataset.json: `ambulo dataset build` makes it")
+    open_dataset(folder)  # Refuses what is not whole, or of another version.
     index = json.loads(path.read_bytes())
     summary = summarise(index)
     if as_json:
@@ -236,14 +267,16 @@ def summarise(index: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _agreement(judged: list[dict[str, Any]]) -> dict[str, float] | None:
+def _agreement(judged: list[dict[str, Any]]) -> dict[str, float | None] | None:
     """Over all clips with labels made by hand, each frame counting alike."""
     if not judged:
         return None
     phase = [entry["phase_frames"] for entry in judged]
     gait = [entry["gait_frames"] for entry in judged]
 
-    def mean(key: str, frames: list[int]) -> float:
+    def mean(key: str, frames: list[int]) -> float | None:
+        if not sum(frames):
+            return None
         return float(np.average([entry[key] for entry in judged], weights=frames))
 
     return {
@@ -269,13 +302,16 @@ def _print(summary: dict[str, Any]) -> None:
         f"steps repeat a foot; {summary['unusable_frames']} frames without a known phase"
     )
     click.echo(f"ground       meets standing feet within {100 * summary['ground_gap_m']:.1f} cm")
-    agreement = summary["agreement"]
-    if agreement:
+    agreement = summary["agreement"] or {}
+    if agreement.get("phase_error") is not None:
         click.echo(
             f"by hand      phase {agreement['phase_error']:.3f} cycles off in the mean (shift "
-            f"{agreement['phase_shift']:+.3f}), gaits agree in "
-            f"{100 * agreement['gait_agreement']:.1f} % of the frames of labelled cycles "
-            f"({100 * agreement['gait_agreement_everywhere']:.1f} % of all)"
+            f"{agreement['phase_shift']:+.3f})"
+        )
+    if agreement.get("gait_agreement") is not None:
+        click.echo(
+            f"by hand      gaits agree in {100 * agreement['gait_agreement']:.1f} % of the frames "
+            f"of labelled cycles ({100 * agreement['gait_agreement_everywhere']:.1f} % of all)"
         )
 
 

@@ -42,7 +42,7 @@ def demo(ctx: click.Context, output: Path, steps: int) -> None:
     click.echo("1 of 4  motion made by rule")
     ctx.invoke(motion, output=clips, minutes=MINUTES, seed=SEED, overwrite=True)
     click.echo("2 of 4  a data set of it")
-    ctx.invoke(build, sources=(clips,), output=data, licence=LICENCE, overwrite=True)
+    ctx.invoke(build, sources=(clips,), output=data, licence=LICENCE, axes="cm", overwrite=True)
     click.echo(f"3 of 4  training for {steps} steps")
     ctx.invoke(
         train, folder=data, output=model, preset="quick", steps=steps, seed=SEED, overwrite=True

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import click
 
+from ambulo import _core
 from ambulo.cli.dataset import MANIFEST, build_dataset, found_licence, plan_dataset
 from ambulo.cli.motion import SUFFIXES, motion_files
 from ambulo.files import write_atomic
 
 
-def data_folder(folder: Path, output: Path, licence: str | None, *, dry_run: bool) -> Path:
+def data_folder(
+    folder: Path, output: Path, licence: str | None, *, dry_run: bool, overwrite: bool
+) -> Path:
     """The data set in a folder, or one made beside the model from the motion files there.
 
     What is there of it already is kept: it goes on where it was stopped.
@@ -29,9 +32,11 @@ def data_folder(folder: Path, output: Path, licence: str | None, *, dry_run: boo
             "says what would be made of them, --dry-run here needs the data set"
         )
     manifest = target / MANIFEST
-    if not manifest.exists():
+    if manifest.exists() and not overwrite:
+        _check_same(manifest, folder, licence)
+    else:
         words = licence if licence is not None else found_licence([folder])
-        settings = f"licence = {json.dumps(words)}\n"
+        settings = f"licence = {json.dumps(words, ensure_ascii=False)}\n"
         text, skipped = plan_dataset(list(motion_files(folder)), target, settings, _threads())
         for path, reason in skipped:
             click.echo(f"left out {path}: {reason}", err=True)
@@ -40,6 +45,20 @@ def data_folder(folder: Path, output: Path, licence: str | None, *, dry_run: boo
     report = build_dataset(target, manifest.read_text(encoding="utf-8"), _threads())
     click.echo(f"{target}: {report['rows'][0]} rows for training", err=True)
     return target
+
+
+def _check_same(manifest: Path, folder: Path, licence: str | None) -> None:
+    """What lies beside the model may be another folder's."""
+    told = json.loads(_core.dataset_check(manifest.read_text(encoding="utf-8")))
+    named = {(manifest.parent / clip["file"]).resolve() for clip in told["clip"]}
+    if not named & {file.resolve() for file in motion_files(folder)}:
+        raise click.ClickException(
+            f"{manifest} was made from other motion than {folder}: --overwrite makes it anew"
+        )
+    if licence is not None and licence != told["licence"]:
+        raise click.ClickException(
+            f"{manifest} states another licence ('{told['licence']}'): --overwrite makes it anew"
+        )
 
 
 def _threads() -> int:

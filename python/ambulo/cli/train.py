@@ -105,7 +105,7 @@ def train(
     _check_places(output, run, resume=resume, overwrite=overwrite, dry_run=dry_run)
     _tensorboard_or_reason(tensorboard)
     _connect(module, distributed, processes, process)
-    folder = data_folder(folder, output, licence, dry_run=dry_run)
+    folder = data_folder(folder, output, licence, dry_run=dry_run, overwrite=overwrite)
     dataset = open_dataset(folder)
     check_exportable(dataset, settings.tuning)
     plan = _plan(module, dataset, settings)
@@ -189,6 +189,10 @@ def _check_places(output: Path, run: Run, *, resume: bool, overwrite: bool, dry_
         raise click.ClickException(f"{output.parent} is not a folder")
     if resume and overwrite:
         raise click.UsageError("--resume goes on, --overwrite starts again: give one of them")
+    if resume and not run.exists:
+        raise click.ClickException(
+            f"{run.folder} holds no run to go on with; without --resume one is started"
+        )
     if resume or overwrite or dry_run:
         return
     if output.exists():

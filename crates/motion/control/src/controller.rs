@@ -16,9 +16,6 @@ use crate::{ControlError, Intent, Model, TrajectoryPoint, Tuning, World};
 /// Longest time that one call catches up on, seconds.
 const LONGEST: f32 = 1.0;
 
-/// No joint of a person turns faster, radians a second: a jump of the network's is spread out.
-const FASTEST_TURN: f32 = 35.0;
-
 /// Feet take no more than this share off the root's speed: a network that slides along without
 /// stepping must still get where it is asked to go.
 const MOST_DRIVEN: f32 = 0.35;
@@ -254,7 +251,8 @@ impl Controller {
         }
         self.next.trajectory.carry(self.slide(dt), world.areas, dt);
         self.take_pose(share(self.tuning.pose_halflife, dt));
-        self.show(world, FASTEST_TURN * dt);
+        let fastest = self.tuning.fastest_turn * dt;
+        self.show(world, if fastest > 0.0 { fastest } else { f32::INFINITY });
         let freedom = self.next.trajectory.freedom(&self.tuning);
         let cycles = self.output.phase_rate.max(0.0) * dt * (0.9 * freedom + 0.1);
         self.next.phase = (self.next.phase + TAU * cycles).rem_euclid(TAU);

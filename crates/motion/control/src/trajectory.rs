@@ -26,6 +26,9 @@ const TO_RUN: [f32; 2] = [3.6, 4.2];
 /// Below this asked speed (metres a second; 0.1 cm a frame at 60 Hz) a character stands.
 const STANDING: f32 = 0.06;
 
+/// Half-life in seconds of what the feet take off the root's movement.
+const CARRY_HALFLIFE: f32 = 0.02;
+
 // Places in GAITS.
 const STAND: usize = 0;
 const WALK: usize = 1;
@@ -306,13 +309,18 @@ impl Trajectory {
 
     /// Moves the present and the future by what the feet say; part of the step that came before.
     pub fn carry(&mut self, shift: Vec2, areas: &Areas, dt: f32) {
-        self.carried = shift / dt;
-        if shift == Vec2::ZERO {
+        // Softly: contacts come and go within a frame or two, and a root that follows them jerks.
+        self.carried = self.carried.lerp(shift / dt, share(CARRY_HALFLIFE, dt));
+        if self.carried == Vec2::ZERO {
             return;
         }
+        let shift = self.carried * dt;
+        let before = self.now().ground();
         for point in &mut self.points[NOW..] {
             point.set_ground(areas.keep_out(point.ground() + shift));
         }
+        // A wall may have had the last word.
+        self.carried = (self.now().ground() - before) / dt;
     }
 
     /// Moves on by one step: the past shifts, the root goes where the network sends it, and the

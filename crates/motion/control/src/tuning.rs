@@ -41,6 +41,9 @@ pub struct Tuning {
     /// How freely a standing character moves its root and its phase: 0 (as published) stops both,
     /// so that it freezes; 1 lets it breathe and shift its weight as its network foresees.
     pub stand_freedom: f32,
+    /// No joint of the shown pose turns faster, radians a second: a jump of the network's is spread
+    /// over some frames. 0 (as published): no limit. A person's fastest joints reach about 35.
+    pub fastest_turn: f32,
     /// Share of a planted foot's slide that is taken off the root's movement: 0 (as published) moves
     /// the root as the network says, 1 as its feet do.
     pub foot_drive: f32,
@@ -66,6 +69,7 @@ impl Default for Tuning {
             speed_halflife: 1.0,
             speed_limit: [1.0, 1.0],
             stand_freedom: 0.0,
+            fastest_turn: 0.0,
             foot_drive: 0.0,
             sway: 0.0,
         }
@@ -91,6 +95,7 @@ impl Tuning {
             self.pose_halflife,
             self.foot_halflife,
             self.speed_halflife,
+            self.fastest_turn,
         ];
         let [least, most] = self.speed_limit;
         let biases = self.position_bias.iter().chain(&self.facing_bias);

@@ -271,6 +271,10 @@ impl Builder<'_> {
         let rows = copies * spans.iter().map(Range::len).sum::<usize>();
         let width = Encoder::width(layout);
         let [rows_file, info_file] = self.paths(shard);
+        // What speaks of the old rows goes before they do: whoever is stopped from here on finds
+        // nothing that claims to be right.
+        forget(&self.folder.join("dataset.json"))?;
+        forget(&info_file)?;
         let mut writer = ShardWriter::create(&rows_file, rows, width)?;
         let mut info = ShardInfo {
             key,
@@ -284,7 +288,7 @@ impl Builder<'_> {
             gait_confidence: mean(&labels.gaits.confidence),
             ground_gap: 0.0,
             level: kind == Kind::Flat,
-            agreement: ready.automatic.as_ref().map(|auto| compare(labels, auto)),
+            agreement: ready.automatic.as_ref().map(|(auto, what)| compare(labels, auto, *what)),
             moments: Moments::default(),
         };
         let mut row = vec![0.0; width];
@@ -316,7 +320,7 @@ impl Builder<'_> {
         writer.finish()?;
         if !shard.mirrored {
             let file = self.folder.join("labels").join(format!("{}.auto.txt", entry.name));
-            let found = ready.automatic.as_ref().unwrap_or(labels);
+            let found = ready.automatic.as_ref().map_or(labels, |(automatic, _)| automatic);
             write_whole(&file, found.to_text(motion.fps()).as_bytes())?;
         }
         write_whole(&info_file, &serde_json::to_vec(&info).map_err(io::Error::other)?)?;
@@ -408,6 +412,11 @@ impl Builder<'_> {
                 "skeleton": self.setup.skeleton,
                 "feet": { "joints": body.soles(), "heights": self.setup.foot_heights },
                 "roles": self.setup.roles,
+                "labels": {
+                    "drop": self.setup.drop,
+                    "contacts": self.setup.contacts,
+                    "gaits": self.setup.gaits,
+                },
             },
             "licence": licence,
             "provenance": { "clips": self.manifest.clips.len().to_string() },
@@ -457,6 +466,14 @@ fn without_moments(info: ShardInfo) -> ShardInfo {
 
 fn mean(values: &[f32]) -> f32 {
     values.iter().sum::<f32>() / values.len().max(1) as f32
+}
+
+/// Removes a file that may not be there.
+fn forget(file: &Path) -> io::Result<()> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Removes files of clips that the manifest no longer names, and unfinished ones.

@@ -31,8 +31,17 @@ const RUN: usize = 3;
 const JOG: usize = 2;
 const BUMP: usize = 6;
 
-/// Compares labels that were found with labels that were given.
-pub fn compare(given: &Labels, found: &Labels) -> Agreement {
+/// Which labels people gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Judged {
+    /// Where in the gait cycle.
+    pub phase: bool,
+    /// Which gait.
+    pub gaits: bool,
+}
+
+/// Compares labels that were found with labels that were given; what was not given has no frames.
+pub fn compare(given: &Labels, found: &Labels, what: Judged) -> Agreement {
     let merged = |labels: &Labels, frame: usize| {
         let mut shares = labels.gaits.shares[frame];
         shares[JOG] += std::mem::take(&mut shares[RUN]);
@@ -42,7 +51,7 @@ pub fn compare(given: &Labels, found: &Labels) -> Agreement {
     let (mut same, mut judged) = ([0, 0], [0, 0]);
     for frame in 0..given.usable.len() {
         let gait = merged(given, frame);
-        if given.phase.known[frame] && found.phase.known[frame] && gait != 0 {
+        if what.phase && given.phase.known[frame] && found.phase.known[frame] && gait != 0 {
             let off = found.phase.cycles[frame] - given.phase.cycles[frame];
             let off = off - off.round();
             errors += off.abs();
@@ -51,7 +60,7 @@ pub fn compare(given: &Labels, found: &Labels) -> Agreement {
             turn.1 += (TAU * off).cos();
         }
         // Bumping into people is not a gait that a body alone tells.
-        if gait != BUMP {
+        if what.gaits && gait != BUMP {
             let (within, agrees) = (given.phase.known[frame], gait == merged(found, frame));
             judged = [judged[0] + u32::from(within), judged[1] + 1];
             same = [same[0] + u32::from(within && agrees), same[1] + u32::from(agrees)];

@@ -29,7 +29,8 @@ mod work;
 
 pub use body::{Body, RoleNames};
 pub use compare::Agreement;
-pub use gait::CATEGORIES;
+pub use contacts::ContactSettings;
+pub use gait::{CATEGORIES, GaitSettings};
 pub use given::{Given, Published};
 pub use ground::Kind;
 pub use manifest::{ClipEntry, Manifest, Split, TerrainSource};

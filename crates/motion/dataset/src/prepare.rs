@@ -7,6 +7,7 @@ use ambulo_rig::glam::DVec3;
 use ambulo_rig::{Axes, Clip, Skeleton};
 
 use crate::body::{Body, RoleNames};
+use crate::compare::Judged;
 use crate::contacts::{ContactSettings, Contacts};
 use crate::gait::GaitSettings;
 use crate::given::{Given, Published};
@@ -54,7 +55,7 @@ pub struct Ready {
     /// What it is labelled with.
     pub labels: Labels,
     /// What was found without the published labels, where there are any.
-    pub automatic: Option<Labels>,
+    pub automatic: Option<(Labels, Judged)>,
 }
 
 /// A clip on the data set's joints, before it is mirrored.
@@ -193,7 +194,9 @@ impl Setup {
     ) -> Result<Ready, String> {
         let body = Body::new(&self.roles, fitted.clip.skeleton())?;
         let clip = if mirror {
-            mirrored(&fitted.clip, &body).map_err(|e| format!("cannot be mirrored: {e}"))?
+            mirrored(&fitted.clip, &body).map_err(|e| {
+                format!("cannot be mirrored ({e}): mirror = false leaves the mirror image out")
+            })?
         } else {
             fitted.clip.clone()
         };
@@ -217,8 +220,11 @@ impl Setup {
             mirrored: mirror,
         };
         let labels = Labels::find(&motion, &body, &sources);
-        let automatic = sources.published.map(|_| {
-            Labels::find(&motion, &body, &Sources { published: None, given: None, ..sources })
+        let automatic = sources.published.map(|(published, _)| {
+            let found =
+                Labels::find(&motion, &body, &Sources { published: None, given: None, ..sources });
+            let phase = !published.phase.is_empty();
+            (found, Judged { phase, gaits: !published.gaits.is_empty() })
         });
         Ok(Ready { motion, labels, automatic })
     }

@@ -191,6 +191,29 @@ fn recordings_and_grounds_count() {
     assert!(folder.build(&flat, 2).unwrap().written > 0);
 }
 
+/// A shard's description and the index go before its rows do: rows of other settings must never be
+/// found under a description that fits the settings of before.
+#[test]
+fn a_rebuild_that_fails_leaves_nothing_that_claims_to_be_right() {
+    let folder = folder();
+    let manifest = folder.manifest(&settings());
+    folder.build(&manifest, 1).unwrap();
+    let wanted = folder.bytes();
+    let mut other = manifest.clone();
+    other.gaits.walk = 0.4;
+    let name = &manifest.clips[0].name;
+    let rows = folder.path.join("shards").join(format!("{name}.npy"));
+    // Where the new rows should go lies a folder: the build stops in the middle of a shard.
+    std::fs::remove_file(&rows).unwrap();
+    std::fs::create_dir(&rows).unwrap();
+    assert!(folder.build(&other, 1).is_err());
+    assert!(!folder.path.join("dataset.json").exists());
+    assert!(!rows.with_extension("json").exists());
+    std::fs::remove_dir(&rows).unwrap();
+    folder.build(&manifest, 1).unwrap();
+    assert_same(&folder.bytes(), &wanted);
+}
+
 #[test]
 fn interrupting_loses_nothing() {
     let whole = folder();
