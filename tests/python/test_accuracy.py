@@ -163,7 +163,11 @@ def test_the_command_reads_files_and_says_what_is_wrong(built, walked, tmp_path)
     found = json.loads(run.output)["splits"]["clips"]
     base = found["one_step"]["baselines"]["mean pose"]
     assert found["one_step"]["position_cm"] == pytest.approx(base["position_cm"], rel=1e-4)
-    assert found["free"]["path_error_m"]["5"] > 0.0
+    free = found["free"]
+    assert free["path_error_m"]["5"] > 0.0
+    # It answers the mean pose, whatever it is asked: as far off as the mean pose is.
+    assert free["position_cm"]["mean"] == pytest.approx(free["baselines_cm"]["mean pose"], rel=0.05)
+    assert free["position_cm"]["max"] >= free["position_cm"]["p95"] > 0.0
     broken = tmp_path / "broken.bvh"
     write_atomic(broken, "HIERARCHY\nROOT nobody\n")
     run = CliRunner().invoke(cli, ["evaluate", "accuracy", str(path), str(broken)])

@@ -147,6 +147,11 @@ def _print(split: str, found: dict[str, Any]) -> None:
         click.echo(f"loop: phase off by {phases} cycles after {', '.join(map(str, SECONDS))} s")
     free = found["free"]
     if free:
+        bases = ", ".join(f"{name} {cm:.1f}" for name, cm in free["baselines_cm"].items())
+        click.echo(
+            f"free run: pose {free['position_cm']['mean']:.1f} cm off the clip's (95 % below "
+            f"{free['position_cm']['p95']:.1f}), at a phase of its own; {bases}"
+        )
         errors = ", ".join(f"{error:.2f}" for error in free["path_error_m"].values())
         ratio = free["distance_ratio"]
         click.echo(
