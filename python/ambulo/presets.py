@@ -244,7 +244,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "steps": 12000,
         "planted": 0.01,
         "tuning": {
-            "pose_halflife": 0.008,
+            "pose_halflife": 0.03,
             "facing_halflife": 0.08,
             "stand_freedom": 1.0,
             "sway": 0.03,
