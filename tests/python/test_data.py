@@ -286,3 +286,40 @@ def test_memory_is_bounded_whatever_the_size(tmp_path: Path) -> None:
     )
     before, after = map(int, run.stdout.split())
     assert after - before < 32 << 10, f"{(after - before) >> 10} MB for a pool of 8"
+
+
+TRAINING = """
+import resource, sys
+from ambulo.cli import cli
+cli(sys.argv[1:], standalone_mode=False)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ru_maxrss counts in another unit")
+def test_training_on_more_than_the_limit_stays_within_it(tmp_path: Path) -> None:
+    """A set of 2 GB (many names of one file) is trained on in 1.5 GB, JAX and all."""
+    folder = write_dataset(tmp_path / "large", clips=2, rows=2000, validation=1)
+    manifest = json.loads((folder / "dataset.json").read_text())
+    shard = folder / "shards" / "clip0.npy"
+    rows = np.load(shard)
+    np.save(shard, np.tile(rows, (50, 1)))
+    clip, held = manifest["clips"]
+    clip.update(rows=100_000, runs=[[0, 100_000]], categories=[50 * n for n in clip["categories"]])
+    copies = []
+    for number in range(16):
+        name = f"copy{number}"
+        (folder / "shards" / f"{name}.npy").hardlink_to(shard)
+        copies.append({**clip, "name": name, "file": f"shards/{name}.npy"})
+    manifest["clips"] = [*copies, held]
+    (folder / "dataset.json").write_text(json.dumps(manifest))
+    assert 16 * shard.stat().st_size > 2_000_000_000
+    config = tmp_path / "small.toml"
+    config.write_text(
+        "hidden = [16]\nsteps = 300\nevery = 150\nbatch = 512\npool_mb = 64\npiece = 64\n"
+    )
+    told = ["train", str(folder), "-o", str(tmp_path / "m.safetensors"), "--config", str(config)]
+    run = subprocess.run(
+        [sys.executable, "-c", TRAINING, *told], capture_output=True, text=True, check=True
+    )
+    assert int(run.stdout.split()[-1]) < 1_500_000, f"{run.stdout.split()[-1]} kB"
