@@ -7,7 +7,8 @@ use ambulo_control as control;
 use ambulo_dataset::prepare::{LabelFiles, Setup};
 use ambulo_dataset::rows::{ClipRows, encode_clip};
 use ambulo_dataset::{
-    ContactSettings, DatasetError, GaitSettings, Loaded, Manifest, RoleNames, build, plan,
+    CATEGORIES, ContactSettings, DatasetError, GaitSettings, Loaded, Manifest, RoleNames, build,
+    plan,
 };
 use ambulo_formats::detect::detect;
 use ambulo_formats::files::read_path;
@@ -69,10 +70,10 @@ impl Callback {
     }
 }
 
-/// The default settings as the text of a manifest.
+/// Kinds of motion that rows are of, in the order of their numbers.
 #[pyfunction]
-pub fn dataset_settings() -> PyResult<String> {
-    Manifest::default().to_text().map_err(value_error)
+pub fn dataset_categories() -> Vec<&'static str> {
+    CATEGORIES.to_vec()
 }
 
 /// Checks the text of a manifest or of settings; returns it as JSON.

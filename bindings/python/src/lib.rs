@@ -14,7 +14,9 @@ mod _core {
     #[pymodule_export]
     use crate::character::{Controller, Terrain, drawn_offsets};
     #[pymodule_export]
-    use crate::dataset::{clip_rows, dataset_build, dataset_check, dataset_plan, dataset_settings};
+    use crate::dataset::{
+        clip_rows, dataset_build, dataset_categories, dataset_check, dataset_plan,
+    };
     #[pymodule_export]
     use crate::errors::MotionFileError;
     #[pymodule_export]

@@ -85,16 +85,16 @@ def build(
         clips = _checked(text, manifest)["clip"]
         _unnamed(clips, sources, output)
     else:
-        text, skipped = _planned(sources, output, config, licence, axes, threads)
+        text, skipped = planned(sources, output, config, licence, axes, threads)
         clips = _checked(text, manifest)["clip"]
     if dry_run:
         click.echo(text)
-        _list(skipped)
+        list_left_out(skipped)
         return
     output.mkdir(parents=True, exist_ok=True)
     if not manifest.exists() or overwrite:
         write_atomic(manifest, text)
-    _list(skipped)
+    list_left_out(skipped)
     report = build_dataset(output, text, threads)
     if as_json:
         named = {str(path): reason for path, reason in skipped}
@@ -156,7 +156,7 @@ def found_licence(sources: Sequence[Path]) -> str:
     return ""
 
 
-def _planned(
+def planned(
     sources: Sequence[Path],
     folder: Path,
     config: Path | None,
@@ -164,6 +164,7 @@ def _planned(
     axes: str | None,
     threads: int,
 ) -> tuple[str, list[tuple[Path, str]]]:
+    """A new manifest's text for motion files, and what is left out of it."""
     if not sources:
         raise click.UsageError(f"{folder} has no {MANIFEST} yet: name motion files or folders")
     files = [file for source in sources for file in motion_files(source)]
@@ -206,7 +207,8 @@ def _unnamed(clips: list[dict[str, Any]], sources: Sequence[Path], folder: Path)
         )
 
 
-def _list(skipped: list[tuple[Path, str]]) -> None:
+def list_left_out(skipped: list[tuple[Path, str]]) -> None:
+    """Say which files are not used, and why."""
     for path, reason in skipped:
         click.echo(f"left out {path}: {reason}", err=True)
 

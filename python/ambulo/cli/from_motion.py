@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from ambulo import _core
-from ambulo.cli.dataset import MANIFEST, build_dataset, found_licence, plan_dataset
+from ambulo.cli.dataset import MANIFEST, build_dataset, list_left_out, planned
 from ambulo.cli.motion import SUFFIXES, motion_files
 from ambulo.files import write_atomic
 
@@ -31,18 +31,15 @@ def data_folder(
             f"{folder} holds motion files: `ambulo dataset build {folder} -o {target} --dry-run` "
             "says what would be made of them, --dry-run here needs the data set"
         )
-    manifest = target / MANIFEST
+    manifest, threads = target / MANIFEST, os.cpu_count() or 1
     if manifest.exists() and not overwrite:
         _check_same(manifest, folder, licence)
     else:
-        words = licence if licence is not None else found_licence([folder])
-        settings = f"licence = {json.dumps(words, ensure_ascii=False)}\n"
-        text, skipped = plan_dataset(list(motion_files(folder)), target, settings, _threads())
-        for path, reason in skipped:
-            click.echo(f"left out {path}: {reason}", err=True)
+        text, skipped = planned([folder], target, None, licence, None, threads)
+        list_left_out(skipped)
         target.mkdir(parents=True, exist_ok=True)
         write_atomic(manifest, text)
-    report = build_dataset(target, manifest.read_text(encoding="utf-8"), _threads())
+    report = build_dataset(target, manifest.read_text(encoding="utf-8"), threads)
     click.echo(f"{target}: {report['rows'][0]} rows for training", err=True)
     return target
 
@@ -59,7 +56,3 @@ def _check_same(manifest: Path, folder: Path, licence: str | None) -> None:
         raise click.ClickException(
             f"{manifest} states another licence ('{told['licence']}'): --overwrite makes it anew"
         )
-
-
-def _threads() -> int:
-    return os.cpu_count() or 1

@@ -258,8 +258,8 @@ def _loop(view: View, windows: Array, pool: ThreadPoolExecutor) -> dict[str, Any
             "last pose + velocity": start + velocity * ((at + 1) / FPS),
             "mean pose": np.broadcast_to(view.mean_pose(), now.shape),
         }
-        off = {name: 100.0 * _off(pose, now) for name, pose in guesses.items()}
-        far = 100.0 * np.linalg.norm(poses[:, at] - now, axis=-1)
+        apart = {n: 100.0 * np.linalg.norm(pose - now, axis=-1) for n, pose in guesses.items()}
+        off, far = {n: float(cm.mean()) for n, cm in apart.items()}, apart["position_cm"]
         report[f"{seconds} s"] = {
             "position_cm": off["position_cm"],
             "position_cm_p95": float(np.percentile(far, 95)),
@@ -429,10 +429,6 @@ def _walk(
         facings.append(now)
         character.step(1 / FPS, velocity.tolist(), gait=gait, facing=facing.tolist(), strafe=1.0)
     return np.stack(places), np.array(path), np.array(facings)
-
-
-def _off(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(a - b, axis=-1).mean())
 
 
 def _share(halflife: float) -> float:

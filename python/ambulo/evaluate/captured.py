@@ -31,7 +31,7 @@ LEVEL = 0.02
 # Runs shorter than this tell nothing of jerk, frames.
 SHORTEST = 12
 # Of a row, as the builder numbers them.
-CATEGORIES = ("stand", "walk", "jog", "run", "crouch", "jump", "backward", "sideways")
+CATEGORIES = tuple(_core.dataset_categories())
 CATEGORY = {
     "stand": "stand", "walk": "walk", "jog": "jog", "run": "run", "crouch": "crouch",
     "back": "backward", "left": "sideways", "right": "sideways",

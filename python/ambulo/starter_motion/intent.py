@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ambulo import _core
 from ambulo.starter_motion.rotations import Floats, ease, mix
 
 FPS = 60.0
-GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "backward", "sideways")
+GAITS = tuple(_core.dataset_categories())
 """Names of the labels: categories of a data set."""
 
 RUNS = ("jog", "run")

@@ -16,6 +16,8 @@ const ASIDE: [(f32, f32, f32); 3] = [(0.13, 0.75, 0.0), (0.31, 0.45, 1.3), (0.53
 const AHEAD: [(f32, f32, f32); 3] = [(0.11, 0.3, 2.2), (0.27, 0.25, 0.4), (0.61, 0.12, 5.0)];
 /// Seconds in which a character goes back to where it stands.
 const SETTLE: f32 = 0.7;
+/// How far a joint is told to be from where it is, as a share of the amplitude.
+const STIR: f32 = 0.2;
 
 /// How a character stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,12 +67,7 @@ impl Wish {
         let swaying = sway_velocity(self.clock + f64::from(ahead), self.facing) * self.amplitude;
         swaying + self.off * ((-ahead / SETTLE).exp() / SETTLE)
     }
-}
 
-/// How far a joint is told to be from where it is, as a share of the amplitude.
-const STIR: f32 = 0.2;
-
-impl Wish {
     /// A slow stir of one joint, metres: told to the network as part of its own pose, to which it
     /// answers with some pose near by.
     pub fn stir(&self, joint: usize) -> Vec3 {

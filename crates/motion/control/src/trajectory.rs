@@ -1,5 +1,6 @@
 //! The path around a character: where it was, where it is, where it means to go.
 
+use ambulo_features::gait::{CROUCH, JOG, JUMP, RUN, STAND, WALK};
 use ambulo_features::{FUTURE, GAITS, Ground, Output, Point, SAMPLES, WINDOW};
 use ambulo_rig::glam::{Quat, Vec2, Vec3};
 
@@ -28,14 +29,6 @@ const STANDING: f32 = 0.06;
 
 /// Half-life in seconds of what the feet take off the root's movement.
 const CARRY_HALFLIFE: f32 = 0.02;
-
-// Places in GAITS.
-const STAND: usize = 0;
-const WALK: usize = 1;
-const JOG: usize = 2;
-const RUN: usize = 3;
-const CROUCH: usize = 4;
-const JUMP: usize = 5;
 
 /// One moment of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

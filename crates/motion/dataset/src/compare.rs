@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use ambulo_features::gait::{BUMP, JOG, RUN};
 use serde::{Deserialize, Serialize};
 
 use crate::gait::strongest;
@@ -26,10 +27,6 @@ pub struct Agreement {
     /// the last one holds to the end of the clip, whatever happens there.
     pub gait_agreement_everywhere: f64,
 }
-
-const RUN: usize = 3;
-const JOG: usize = 2;
-const BUMP: usize = 6;
 
 /// Which labels people gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

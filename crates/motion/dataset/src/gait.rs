@@ -1,6 +1,7 @@
 //! Which gait a frame is: from speed, from the height of the hips, and from time off the ground.
 
 use ambulo_features::GAITS;
+use ambulo_features::gait::{CROUCH, JOG, JUMP, RUN, STAND, WALK};
 use serde::{Deserialize, Serialize};
 
 use crate::body::Body;
@@ -37,14 +38,6 @@ pub const CATEGORIES: [&str; 8] =
     ["stand", "walk", "jog", "run", "crouch", "jump", "backward", "sideways"];
 const BACKWARD: u8 = 6;
 const SIDEWAYS: u8 = 7;
-
-const STAND: usize = 0;
-const WALK: usize = 1;
-const JOG: usize = 2;
-const RUN: usize = 3;
-/// Crouching, in the order of [`GAITS`].
-pub const CROUCH: usize = 4;
-const JUMP: usize = 5;
 
 /// A frame with this much more flight than double support (its inverse) is surely jogging.
 const AERIAL: f32 = 20.0;

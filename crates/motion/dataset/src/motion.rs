@@ -19,10 +19,15 @@ pub struct Root {
     pub facing: Vec2,
 }
 
+/// Radians from +Z (the vector's y) towards +X.
+pub fn yaw(direction: Vec2) -> f32 {
+    direction.x.atan2(direction.y)
+}
+
 impl Root {
     /// Radians, 0 along +Z, positive towards +X.
     pub fn yaw(&self) -> f32 {
-        self.facing.x.atan2(self.facing.y)
+        yaw(self.facing)
     }
 
     /// A direction of the world in this root's frame.
@@ -203,6 +208,7 @@ pub fn mirrored(clip: &Clip, body: &Body) -> Result<Clip, MirrorError> {
 /// A few dozen frames of a clip, turned so that all of them face +Z. How a joint's own frame is
 /// reflected is chosen by its usual rotation, and partners by shape across the plane of X: neither
 /// may depend on where a clip happens to walk, or one data set holds two kinds of mirrored hips.
+/// (The mirror itself knows no up axis to take a heading out about; here it is known.)
 fn facing_forward(clip: &Clip, body: &Body) -> Clip {
     let (mut translations, mut rotations, mut places) = (vec![], vec![], vec![]);
     for frame in (0..clip.frames()).step_by(clip.frames().div_ceil(64)) {

@@ -2,15 +2,16 @@
 //!
 //! Source: section 5.1 of the PFNN paper; the meaning of each number is the layout's.
 
+use ambulo_features::gait::CROUCH;
 use ambulo_features::{FUTURE, Input, Layout, Output, Point, SAMPLES, WINDOW};
 use ambulo_rig::glam::Vec2;
 use ambulo_rig::{Flat, Terrain};
 
 use crate::body::Body;
 use crate::filter::stretches;
-use crate::gait::CROUCH;
+
 use crate::labels::Labels;
-use crate::motion::{Motion, Root};
+use crate::motion::{Motion, Root, yaw};
 use crate::prepare::{Ready, Setup};
 
 /// Frames between samples of the trajectory.
@@ -101,7 +102,7 @@ impl<'a> Encoder<'a> {
         let motion = self.motion;
         let (root, next) = (motion.root(frame), motion.root(frame + 1));
         self.output.root_velocity = root.inward(next.position - root.position) * motion.fps();
-        self.output.yaw_rate = root.inward(next.facing).to_angle_from_forward() * motion.fps();
+        self.output.yaw_rate = yaw(root.inward(next.facing)) * motion.fps();
         self.output.phase_rate = self.labels.phase.rate(frame, motion.fps());
         self.output.contacts = self.contacts(frame);
         for sample in 0..FUTURE {
@@ -171,17 +172,6 @@ pub fn encode_clip(setup: &Setup, ready: &Ready) -> Result<ClipRows, String> {
         return Err("no frame can be used: it is too short, or no steps were found in it".into());
     }
     Ok(ClipRows { rows, width, runs })
-}
-
-trait Forward {
-    /// Radians from +Z (the vector's y) towards +X.
-    fn to_angle_from_forward(self) -> f32;
-}
-
-impl Forward for Vec2 {
-    fn to_angle_from_forward(self) -> f32 {
-        self.x.atan2(self.y)
-    }
 }
 
 /// A root as another one sees it.

@@ -12,6 +12,18 @@ pub const WINDOW: usize = 60;
 /// one takes jog and run for one gait, Ambulo's own has no bumping into walls.
 pub const GAITS: [&str; 7] = ["stand", "walk", "jog", "run", "crouch", "jump", "bump"];
 
+/// Places of the gaits in [`GAITS`].
+#[allow(missing_docs)]
+pub mod gait {
+    pub const STAND: usize = 0;
+    pub const WALK: usize = 1;
+    pub const JOG: usize = 2;
+    pub const RUN: usize = 3;
+    pub const CROUCH: usize = 4;
+    pub const JUMP: usize = 5;
+    pub const BUMP: usize = 6;
+}
+
 /// A named run of numbers within a vector.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {

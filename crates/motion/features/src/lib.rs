@@ -9,5 +9,5 @@
 mod layout;
 mod vectors;
 
-pub use layout::{Block, GAITS, Layout, LayoutError, SAMPLES, WINDOW};
+pub use layout::{Block, GAITS, Layout, LayoutError, SAMPLES, WINDOW, gait};
 pub use vectors::{FUTURE, Ground, Input, Output, Point};
