@@ -74,7 +74,7 @@ def _averaged(blocks: dict[str, slice], std: Rows, floor: float) -> Rows:
 
 
 def _group(name: str, outputs: bool) -> str:
-    """Blocks of one group share a deviation: §5 of the published training."""
+    """Blocks of one group share a deviation, as in the published training."""
     kind = name.split("_")[0]
     together = ("gait", "terrain", *(("trajectory", "direction") if outputs else ()))
     return kind if kind in together else name

@@ -20,7 +20,7 @@ mod _core {
     #[pymodule_export]
     use crate::errors::MotionFileError;
     #[pymodule_export]
-    use crate::model::{Model, layout, phase_shares};
+    use crate::model::{Model, joint_rotations, layout, phase_shares};
     #[pymodule_export]
     use crate::motion::{Clip, motion_axes, read_motion, write_motion};
 }

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use ambulo_features::{Block, Layout};
+use ambulo_features::{Block, Layout, Output};
 use ambulo_net::{Bundle, CONTROL_POINTS, Layer, Network, Normalisation, Precision, spline_shares};
-use numpy::ndarray::Array2;
+use numpy::ndarray::{Array2, Array3};
 use numpy::{
-    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyUntypedArrayMethods,
+    IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -195,6 +195,31 @@ pub fn layout<'py>(py: Python<'py>, name: &str, joints: usize) -> PyResult<Bound
     dict.set_item("inputs", table(layout.inputs()))?;
     dict.set_item("outputs", table(layout.outputs()))?;
     Ok(dict)
+}
+
+/// Output vectors (N, outputs) of a layout to (N, J, 4) rotations x, y, z, w from the root.
+#[pyfunction]
+pub fn joint_rotations<'py>(
+    py: Python<'py>,
+    name: &str,
+    joints: usize,
+    outputs: PyReadonlyArray2<'py, f32>,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    let layout = Layout::named(name, joints).map_err(value_error)?;
+    let rows = outputs.as_array();
+    if rows.ncols() != layout.output_len() {
+        let message =
+            format!("outputs have {} columns, expected {}", rows.ncols(), layout.output_len());
+        return Err(PyValueError::new_err(message));
+    }
+    let mut output = Output::zero(joints);
+    let mut numbers = Vec::with_capacity(rows.nrows() * joints * 4);
+    for row in rows.rows() {
+        layout.decode_output(&row.to_vec(), &mut output);
+        numbers.extend(output.joint_rotation.iter().flat_map(|rotation| rotation.to_array()));
+    }
+    let array = Array3::from_shape_vec((rows.nrows(), joints, 4), numbers);
+    Ok(array.expect("four numbers a rotation").into_pyarray(py))
 }
 
 /// Phases in cycles to (N, 4) shares of the control points.

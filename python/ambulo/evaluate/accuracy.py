@@ -140,8 +140,10 @@ def _one_step(
         found[f"{name} relative"] = (off / reach).mean(axis=1)
         found[f"{name} cm"] = 100.0 * off.mean(axis=1)
     found["max cm"] = 100.0 * np.linalg.norm(poses["model"] - true, axis=-1).max(axis=1)
-    turn = np.einsum("njab,njab->nj", view.axes(predicted), view.axes(y))
-    angles = np.degrees(np.arccos(np.clip(0.5 * (turn - 1.0), -1.0, 1.0)))
+    ours, theirs = view.rotations(predicted), view.rotations(y)
+    # Of the two quaternions of a rotation the nearer one; the chord is exact for small angles.
+    chords = [np.linalg.norm(ours - sign * theirs, axis=-1) for sign in (1.0, -1.0)]
+    angles = np.degrees(4.0 * np.arcsin(np.clip(0.5 * np.minimum(*chords), 0.0, 1.0)))
     found["rotation deg"] = angles.mean(axis=1)
     told, seen = view.contacts(predicted), view.contacts(y)
     found["true positive"] = (told & seen).sum(axis=1)

@@ -23,9 +23,9 @@ class View:
         self.model, self.core, self.threads = model, model.core, threads
         layout = model.header["layout"]
         self.inputs, self.outputs = spans(layout["inputs"]), spans(layout["outputs"])
-        self.joints = len(model.names)
+        self.joints, self.layout = len(model.names), layout["name"]
         self.columns = spans([*COLUMNS, ("input", self.core.inputs), ("output", self.core.outputs)])
-        table = _core.layout(layout["name"], self.joints)
+        table = _core.layout(self.layout, self.joints)
         self.unit = table["units_per_metre"]
         self.rate_time = table["rate_time"]
         self.feet = model.header["parts"]["feet"]["joints"]
@@ -53,15 +53,10 @@ class View:
         block = getattr(self, side)["joint_velocity"]
         return vectors[:, block].reshape(len(vectors), -1, 3) * self.speed
 
-    def axes(self, vectors: Array) -> Array:
-        """(N, J, 3, 3) rotations as matrices; columns are where the axes go."""
-        block = vectors[:, self.outputs["joint_rotation"]].astype(float)
-        if block.shape[1] == 3 * self.joints:
-            return _from_half_log(block.reshape(len(vectors), -1, 3))
-        two = block.reshape(len(vectors), -1, 2, 3)
-        x = _unit(two[:, :, 0])
-        z = _unit(np.cross(x, two[:, :, 1]))
-        return np.stack([x, np.cross(z, x), z], axis=-1)
+    def rotations(self, vectors: Array) -> Array:
+        """(N, J, 4) unit quaternions x, y, z, w from the root, as the runtime reads them."""
+        vectors = np.ascontiguousarray(vectors, np.float32)
+        return _core.joint_rotations(self.layout, self.joints, vectors).astype(float)
 
     def contacts(self, vectors: Array) -> NDArray[np.bool_]:
         """(N, 4) left heel, left toe, right heel, right toe."""
@@ -107,20 +102,3 @@ def turned(vectors: Array, yaw: Array) -> Array:
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.stack([x * cos + z * sin, y, z * cos - x * sin], axis=-1)
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
-
-
-def _from_half_log(logs: Array) -> Array:
-    """Unit axis × half angle to matrices (Rodrigues)."""
-    angle = 2.0 * np.linalg.norm(logs, axis=-1, keepdims=True)
-    axis = _unit(logs)
-    eye = np.eye(3)
-    columns = []
-    for column in range(3):
-        v = np.broadcast_to(eye[column], axis.shape)
-        along = axis * (axis * v).sum(-1, keepdims=True)
-        columns.append(along + (v - along) * np.cos(angle) + np.cross(axis, v) * np.sin(angle))
-    return np.stack(columns, axis=-1)
