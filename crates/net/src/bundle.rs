@@ -1,12 +1,13 @@
 //! One file that holds a network and everything needed to use it rightly.
 //!
-//! A safetensors file. Tensors: `layers.N.weight` (4, outputs, inputs), `layers.N.bias`
-//! (4, outputs), `input.mean`, `input.std`, `output.mean`, `output.std`. Each is float32, or float16
-//! to halve the file; in memory all are float32. Its metadata has one entry, `ambulo`: the
-//! [`Header`] as JSON. One entry, because the order of several is not fixed and the same bundle
-//! must always be the same bytes.
+//! A safetensors file. Tensors of a [`Network`]: `layers.N.weight` (4, outputs, inputs),
+//! `layers.N.bias` (4, outputs), `input.mean`, `input.std`, `output.mean`, `output.std`; of an
+//! [`Mlp`](crate::Mlp): `layers.N.weight` (outputs, inputs), `layers.N.bias` (outputs), `gain` (1).
+//! Each is float32, or float16 to halve the file; in memory all are float32. Its metadata has one
+//! entry, `ambulo`: the [`Header`] as JSON. One entry, because the order of several is not fixed and
+//! the same bundle must always be the same bytes.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use half::f16;
 use safetensors::tensor::{Dtype, TensorView};
@@ -52,9 +53,9 @@ pub struct LayoutTable {
 pub struct Header {
     /// Version of the file format.
     pub format: u32,
-    /// Architecture: `pfnn`.
+    /// Architecture: `pfnn`, or `mlp`.
     pub kind: String,
-    /// Activation of the hidden layers: `elu`.
+    /// Activation: `elu` of a `pfnn`; `logistic`, `tanh` or `cheap_tanh` of an `mlp`.
     pub activation: String,
     /// Steps a second that the network was trained for.
     pub fps: f64,
@@ -83,7 +84,7 @@ pub enum BundleError {
     )]
     Version { found: u32 },
     #[error("{what} '{found}' is not known; expected '{expected}'")]
-    Unknown { what: &'static str, found: String, expected: &'static str },
+    Unknown { what: &'static str, found: String, expected: String },
     #[error("fps must be positive and finite, not {0}")]
     Fps(f64),
     #[error("tensor '{0}' is missing")]
@@ -103,22 +104,96 @@ pub enum BundleError {
     Network(#[from] NetworkError),
 }
 
+/// Numbers that a bundle can hold: an architecture.
+pub trait Weights: Sized {
+    /// The header's `kind`.
+    const KIND: &'static str;
+    /// What the header's `activation` may be.
+    const ACTIVATIONS: &'static [&'static str];
+
+    /// Numbers in.
+    fn inputs(&self) -> usize;
+    /// Numbers out.
+    fn outputs(&self) -> usize;
+    /// The header's `activation`.
+    fn activation(&self) -> &'static str;
+    /// Names of all tensors of so many layers.
+    fn names(layers: usize) -> Vec<String>;
+    /// Its tensors, in the order of the file.
+    fn tensors(&self) -> Vec<Tensor>;
+    /// From a file's tensors.
+    ///
+    /// # Errors
+    /// Tensors that are missing or not as they must be.
+    fn read(tensors: &Tensors<'_>, activation: &str) -> Result<Self, BundleError>;
+}
+
+/// A tensor to be written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tensor {
+    /// Its name in the file.
+    pub name: String,
+    /// Its shape.
+    pub shape: Vec<usize>,
+    /// Its numbers, row-major.
+    pub values: Vec<f32>,
+    /// Whether it may be rounded to half precision.
+    pub may_be_half: bool,
+}
+
+/// The tensors of a file.
+pub struct Tensors<'bytes> {
+    tensors: SafeTensors<'bytes>,
+    layers: usize,
+}
+
+impl Tensors<'_> {
+    /// How many layers there are, by their names.
+    pub fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// Shape and numbers of a tensor.
+    ///
+    /// # Errors
+    /// It is missing, or not of floats.
+    pub fn floats(&self, name: &str) -> Result<(Vec<usize>, Vec<f32>), BundleError> {
+        let tensor = self.tensors.tensor(name).map_err(|_| BundleError::Missing(name.into()))?;
+        let values = match tensor.dtype() {
+            Dtype::F32 => numbers(tensor.data(), f32::from_le_bytes),
+            Dtype::F16 => numbers(tensor.data(), |word| f16::from_le_bytes(word).to_f32()),
+            other => {
+                let (tensor, found) = (name.into(), format!("{other:?}"));
+                return Err(BundleError::Tensor { tensor, expected: "float32 or float16", found });
+            }
+        };
+        Ok((tensor.shape().to_vec(), values))
+    }
+}
+
 /// A network and its header.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bundle {
+pub struct BundleOf<N> {
     header: Header,
-    network: Network,
+    network: N,
     precision: Precision,
 }
 
-impl Bundle {
+/// A phase-functioned network and its header.
+pub type Bundle = BundleOf<Network>;
+
+impl<N: Weights> BundleOf<N> {
     /// Checks that header and network belong together.
     ///
     /// # Errors
     /// An unknown version, kind or activation, a frame rate that is not positive, blocks that do
     /// not sum to the network's widths.
-    pub fn new(header: Header, network: Network) -> Result<Self, BundleError> {
-        check_header(&header)?;
+    pub fn new(header: Header, network: N) -> Result<Self, BundleError> {
+        check_header::<N>(&header)?;
+        if header.activation != network.activation() {
+            let expected = network.activation().to_owned();
+            return Err(unknown("activation", &header.activation, expected));
+        }
         let sides = [
             ("inputs", &header.layout.inputs, network.inputs()),
             ("outputs", &header.layout.outputs, network.outputs()),
@@ -138,7 +213,7 @@ impl Bundle {
     }
 
     /// The network.
-    pub fn network(&self) -> &Network {
+    pub fn network(&self) -> &N {
         &self.network
     }
 
@@ -152,23 +227,20 @@ impl Bundle {
     /// # Errors
     /// Anything that is not a complete, consistent bundle of a known version, with what is wrong.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, BundleError> {
-        let (_, metadata) = SafeTensors::read_metadata(bytes)?;
-        let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
-        let json = entry.ok_or(BundleError::NotABundle)?;
-        // The version first: a later header may have fields that this one does not know.
-        #[derive(Deserialize)]
-        struct Version {
-            format: u32,
-        }
-        let version: Version = serde_json::from_str(json).map_err(BundleError::Header)?;
-        if version.format > FORMAT_VERSION {
-            return Err(BundleError::Version { found: version.format });
-        }
-        let header: Header = serde_json::from_str(json).map_err(BundleError::Header)?;
-        check_header(&header)?;
+        let header = Header::from_bytes(bytes)?;
+        check_header::<N>(&header)?;
         let tensors = SafeTensors::deserialize(bytes)?;
-        let mut bundle = Self::new(header, read_network(&tensors)?)?;
-        let layers = tensors.iter().filter(|(name, _)| !NORMALISATION.contains(name));
+        let all = 0..;
+        let layers =
+            all.take_while(|i| tensors.tensor(&format!("layers.{i}.weight")).is_ok()).count();
+        let known = N::names(layers);
+        let extra = |name: &&str| !known.iter().any(|known| known == name);
+        if let Some(extra) = tensors.names().into_iter().find(extra) {
+            return Err(BundleError::Extra(extra.into()));
+        }
+        let tensors = Tensors { tensors, layers };
+        let mut bundle = Self::new(header.clone(), N::read(&tensors, &header.activation)?)?;
+        let layers = tensors.tensors.iter().filter(|(name, _)| name.starts_with("layers."));
         if layers.into_iter().all(|(_, tensor)| tensor.dtype() == Dtype::F16) {
             bundle.precision = Precision::Half;
         }
@@ -182,20 +254,9 @@ impl Bundle {
     pub fn to_bytes(&self, precision: Precision) -> Result<Vec<u8>, BundleError> {
         let json = serde_json::to_string(&self.header).map_err(BundleError::Header)?;
         let mut tensors = Vec::new();
-        for (index, layer) in self.network.layers().iter().enumerate() {
-            let (inputs, outputs) = (layer.inputs(), layer.outputs());
-            let weight = format!("layers.{index}.weight");
-            let shape = vec![CONTROL_POINTS, outputs, inputs];
-            tensors.push(Stored::new(weight, shape, &layer.weights(), precision)?);
-            let bias = format!("layers.{index}.bias");
-            let shape = vec![CONTROL_POINTS, outputs];
-            tensors.push(Stored::new(bias, shape, &layer.biases(), precision)?);
-        }
-        let n = self.network.normalisation();
-        let values = [&n.input_mean, &n.input_std, &n.output_mean, &n.output_std];
-        for (name, values) in NORMALISATION.into_iter().zip(values) {
-            let shape = vec![values.len()];
-            tensors.push(Stored::new(name.to_owned(), shape, values, Precision::Single)?);
+        for Tensor { name, shape, values, may_be_half } in self.network.tensors() {
+            let precision = if may_be_half { precision } else { Precision::Single };
+            tensors.push(Stored::new(name, shape, &values, precision)?);
         }
         let views = tensors
             .iter()
@@ -204,6 +265,108 @@ impl Bundle {
         let metadata = HashMap::from([(METADATA_KEY.to_owned(), json)]);
         Ok(safetensors::serialize(views, Some(metadata))?)
     }
+}
+
+impl Header {
+    /// Only the header of a bundle of any kind.
+    ///
+    /// # Errors
+    /// Bytes that are no bundle, a version that is not known, a broken header.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, BundleError> {
+        let (_, metadata) = SafeTensors::read_metadata(bytes)?;
+        let entry = metadata.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
+        let json = entry.ok_or(BundleError::NotABundle)?;
+        // The version first: a later header may have fields that this one does not know.
+        #[derive(Deserialize)]
+        struct Version {
+            format: u32,
+        }
+        let version: Version = serde_json::from_str(json).map_err(BundleError::Header)?;
+        if version.format > FORMAT_VERSION {
+            return Err(BundleError::Version { found: version.format });
+        }
+        serde_json::from_str(json).map_err(BundleError::Header)
+    }
+}
+
+impl Weights for Network {
+    const KIND: &'static str = "pfnn";
+    const ACTIVATIONS: &'static [&'static str] = &["elu"];
+
+    fn inputs(&self) -> usize {
+        self.inputs()
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs()
+    }
+
+    fn activation(&self) -> &'static str {
+        "elu"
+    }
+
+    fn names(layers: usize) -> Vec<String> {
+        layer_names(layers).chain(NORMALISATION.map(String::from)).collect()
+    }
+
+    fn tensors(&self) -> Vec<Tensor> {
+        let mut tensors = Vec::new();
+        for (index, layer) in self.layers().iter().enumerate() {
+            let (inputs, outputs) = (layer.inputs(), layer.outputs());
+            tensors.push(Tensor {
+                name: format!("layers.{index}.weight"),
+                shape: vec![CONTROL_POINTS, outputs, inputs],
+                values: layer.weights(),
+                may_be_half: true,
+            });
+            tensors.push(Tensor {
+                name: format!("layers.{index}.bias"),
+                shape: vec![CONTROL_POINTS, outputs],
+                values: layer.biases(),
+                may_be_half: true,
+            });
+        }
+        let n = self.normalisation();
+        let values = [&n.input_mean, &n.input_std, &n.output_mean, &n.output_std];
+        tensors.extend(NORMALISATION.into_iter().zip(values).map(|(name, values)| Tensor {
+            name: name.into(),
+            shape: vec![values.len()],
+            values: values.clone(),
+            may_be_half: false,
+        }));
+        tensors
+    }
+
+    fn read(tensors: &Tensors<'_>, _: &str) -> Result<Self, BundleError> {
+        let mut layers = Vec::with_capacity(tensors.layers());
+        for index in 0..tensors.layers() {
+            let (shape, weights) = tensors.floats(&format!("layers.{index}.weight"))?;
+            let (_, biases) = tensors.floats(&format!("layers.{index}.bias"))?;
+            let [CONTROL_POINTS, outputs, inputs] = shape[..] else {
+                return Err(BundleError::Tensor {
+                    tensor: format!("layers.{index}.weight"),
+                    expected: "a shape of 4 × outputs × inputs",
+                    found: format!("{shape:?}"),
+                });
+            };
+            layers.push(Layer::new(index, inputs, outputs, &weights, &biases)?);
+        }
+        let [input_mean, input_std, output_mean, output_std] =
+            NORMALISATION.map(|name| tensors.floats(name).map(|(_, values)| values));
+        let (input_mean, input_std) = (input_mean?, input_std?);
+        let (output_mean, output_std) = (output_mean?, output_std?);
+        let normalisation = Normalisation { input_mean, input_std, output_mean, output_std };
+        Ok(Network::new(layers, normalisation)?)
+    }
+}
+
+/// Names of the tensors of so many layers.
+pub(crate) fn layer_names(layers: usize) -> impl Iterator<Item = String> {
+    (0..layers).flat_map(|i| ["weight", "bias"].map(|part| format!("layers.{i}.{part}")))
+}
+
+fn unknown(what: &'static str, found: &str, expected: String) -> BundleError {
+    BundleError::Unknown { what, found: found.to_owned(), expected }
 }
 
 /// A tensor as the file holds it.
@@ -238,60 +401,20 @@ impl Stored {
     }
 }
 
-fn check_header(header: &Header) -> Result<(), BundleError> {
+fn check_header<N: Weights>(header: &Header) -> Result<(), BundleError> {
     if header.format > FORMAT_VERSION || header.format == 0 {
         return Err(BundleError::Version { found: header.format });
     }
-    let known = [("kind", &header.kind, "pfnn"), ("activation", &header.activation, "elu")];
-    for (what, found, expected) in known {
-        if found != expected {
-            return Err(BundleError::Unknown { what, found: found.clone(), expected });
-        }
+    if header.kind != N::KIND {
+        return Err(unknown("kind", &header.kind, N::KIND.into()));
+    }
+    if !N::ACTIVATIONS.contains(&header.activation.as_str()) {
+        return Err(unknown("activation", &header.activation, N::ACTIVATIONS.join("' or '")));
     }
     if !(header.fps > 0.0 && header.fps.is_finite()) {
         return Err(BundleError::Fps(header.fps));
     }
     Ok(())
-}
-
-fn read_network(tensors: &SafeTensors<'_>) -> Result<Network, BundleError> {
-    let count = (0..).take_while(|i| tensors.tensor(&format!("layers.{i}.weight")).is_ok()).count();
-    let of_layers = (0..count).flat_map(|i| ["weight", "bias"].map(|p| format!("layers.{i}.{p}")));
-    let known: HashSet<_> = of_layers.chain(NORMALISATION.map(String::from)).collect();
-    if let Some(extra) = tensors.names().into_iter().find(|name| !known.contains(*name)) {
-        return Err(BundleError::Extra(extra.into()));
-    }
-    let mut layers = Vec::with_capacity(count);
-    for index in 0..count {
-        let (shape, weights) = floats(tensors, &format!("layers.{index}.weight"))?;
-        let (_, biases) = floats(tensors, &format!("layers.{index}.bias"))?;
-        let [CONTROL_POINTS, outputs, inputs] = shape[..] else {
-            return Err(BundleError::Tensor {
-                tensor: format!("layers.{index}.weight"),
-                expected: "a shape of 4 × outputs × inputs",
-                found: format!("{shape:?}"),
-            });
-        };
-        layers.push(Layer::new(index, inputs, outputs, &weights, &biases)?);
-    }
-    let [input_mean, input_std, output_mean, output_std] =
-        NORMALISATION.map(|name| floats(tensors, name).map(|(_, values)| values));
-    let (input_mean, input_std) = (input_mean?, input_std?);
-    let (output_mean, output_std) = (output_mean?, output_std?);
-    Ok(Network::new(layers, Normalisation { input_mean, input_std, output_mean, output_std })?)
-}
-
-fn floats(tensors: &SafeTensors<'_>, name: &str) -> Result<(Vec<usize>, Vec<f32>), BundleError> {
-    let tensor = tensors.tensor(name).map_err(|_| BundleError::Missing(name.into()))?;
-    let values = match tensor.dtype() {
-        Dtype::F32 => numbers(tensor.data(), f32::from_le_bytes),
-        Dtype::F16 => numbers(tensor.data(), |word| f16::from_le_bytes(word).to_f32()),
-        other => {
-            let (tensor, found) = (name.into(), format!("{other:?}"));
-            return Err(BundleError::Tensor { tensor, expected: "float32 or float16", found });
-        }
-    };
-    Ok((tensor.shape().to_vec(), values))
 }
 
 fn numbers<const N: usize>(bytes: &[u8], read: impl Fn([u8; N]) -> f32) -> Vec<f32> {

@@ -6,13 +6,19 @@
 //!
 //! The network is that of Holden, Komura and Saito, "Phase-Functioned Neural Networks for
 //! Character Control" (SIGGRAPH 2017): affine layers with ELU in between, whose weights are a
-//! closed Catmull-Rom spline through four control points, followed once a cycle.
+//! closed Catmull-Rom spline through four control points, followed once a cycle. Beside it there is
+//! the plain fully connected network that evolution likes: [`Mlp`].
 
 mod bundle;
 mod kernel;
+mod mlp;
 mod network;
 mod phase;
 
-pub use bundle::{Bundle, BundleError, FORMAT_VERSION, Header, LayoutTable, Precision};
+pub use bundle::{
+    Bundle, BundleError, BundleOf, FORMAT_VERSION, Header, LayoutTable, Precision, Tensor, Tensors,
+    Weights,
+};
+pub use mlp::{Activation, Mlp, MlpScratch};
 pub use network::{Layer, Network, NetworkError, Normalisation, Scratch};
 pub use phase::{CONTROL_POINTS, control_weights, spline_shares};

@@ -5,7 +5,7 @@ use crate::{CONTROL_POINTS, control_weights};
 
 /// Largest width of a layer: far above any network of this kind, low enough that a broken file
 /// cannot ask for memory it does not bring.
-const MAX_WIDTH: usize = 1 << 16;
+pub(crate) const MAX_WIDTH: usize = 1 << 16;
 
 /// Why numbers are not a network.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -202,7 +202,7 @@ impl Network {
     }
 }
 
-fn check(tensor: &str, values: &[f32], expected: usize) -> Result<(), NetworkError> {
+pub(crate) fn check(tensor: &str, values: &[f32], expected: usize) -> Result<(), NetworkError> {
     if values.len() != expected {
         let (tensor, got) = (tensor.into(), values.len());
         return Err(NetworkError::Count { tensor, expected, got });
