@@ -1,5 +1,8 @@
 """Learned character animation: load a model, give it wishes, take its poses.
 
+2D creatures that evolve how they move: `load_creature`, `load_creature_controller`, and the command
+line's `ambulo evolve`.
+
     >>> import ambulo
     >>> model = ambulo.load_model("model.safetensors")
     >>> character = ambulo.Controller(model)
@@ -7,12 +10,21 @@
     >>> character.positions().shape
     (31, 3)
 
-Everything is in metres, seconds and radians, right-handed, +Y up, +Z forward (a character that
-faces +Z has its left at +X), quaternions as (x, y, z, w).
+Metres, seconds and radians throughout. Characters: right-handed, +Y up, +Z forward (one that faces
++Z has its left at +X), quaternions as (x, y, z, w). Creatures: x forward, y up.
 """
 
-from ambulo._core import Clip, MotionFileError, read_motion, write_motion
+from ambulo._core import (
+    Clip,
+    Creature,
+    CreatureController,
+    CreatureFileError,
+    MotionFileError,
+    read_motion,
+    write_motion,
+)
 from ambulo.character import Controller
+from ambulo.creature import CreatureError, load_creature, load_creature_controller
 from ambulo.loading import load_model
 from ambulo.model import Model, ModelError
 from ambulo.terrain import Terrain
@@ -20,10 +32,16 @@ from ambulo.terrain import Terrain
 __all__ = [
     "Clip",
     "Controller",
+    "Creature",
+    "CreatureController",
+    "CreatureError",
+    "CreatureFileError",
     "Model",
     "ModelError",
     "MotionFileError",
     "Terrain",
+    "load_creature",
+    "load_creature_controller",
     "load_model",
     "read_motion",
     "write_motion",

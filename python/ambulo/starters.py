@@ -1,10 +1,11 @@
-"""What ships with the project: where the starter model lies."""
+"""What ships with the project: where the starter model and the creatures lie."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 HUMAN = "human.safetensors"
+FOLDER = Path(__file__).resolve().parents[2] / "starters"
 
 
 def starter_model() -> Path:
@@ -13,10 +14,15 @@ def starter_model() -> Path:
     Raises:
         FileNotFoundError: this is not a checkout of the project; the message says what to do.
     """
-    path = Path(__file__).resolve().parents[2] / "starters" / HUMAN
+    path = FOLDER / HUMAN
     if not path.is_file():
         raise FileNotFoundError(
             f"{path} is missing: it comes with a checkout of the project; `ambulo starter motion` "
             "and `ambulo train --preset starter` make another"
         )
     return path
+
+
+def starter_creatures() -> dict[str, Path]:
+    """The creatures' files by name; none where this is not a checkout of the project."""
+    return {path.stem: path for path in sorted((FOLDER / "creatures").glob("*.json"))}

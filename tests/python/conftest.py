@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import creature_runs
 from ambulo import Model, _core
 
 JOINTS = (
@@ -125,3 +126,20 @@ def toy() -> Model:
 def toys(request: pytest.FixtureRequest) -> Model:
     """One of each layout."""
     return follower(request.param)
+
+
+@pytest.fixture(scope="session")
+def small_config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Settings of a search that is over in a blink."""
+    path = tmp_path_factory.mktemp("config") / "small.toml"
+    path.write_text(creature_runs.TOML)
+    return path
+
+
+@pytest.fixture(scope="session")
+def finished_run(tmp_path_factory: pytest.TempPathFactory, small_config: Path) -> Path:
+    """The folder of a finished run: `creature_runs.SMALL`, of Biped 1. Not to be changed."""
+    folder = tmp_path_factory.mktemp("evolved") / "run"
+    run = creature_runs.ambulo("evolve", "biped1", "run", "-o", folder, "--config", small_config)
+    assert run.exit_code == 0, run.output
+    return folder

@@ -2,6 +2,7 @@
 
 use std::io;
 
+use ambulo_body::BodyError;
 use ambulo_dataset::DatasetError;
 use ambulo_formats::files::FileError;
 use pyo3::exceptions::PyValueError;
@@ -13,6 +14,13 @@ pyo3::create_exception!(
     PyValueError,
     "A motion file that is refused. `line` and `column`, both from 1, and the texts `expected` and \
      `found` say where and why; all are None where the file as a whole is meant."
+);
+
+pyo3::create_exception!(
+    ambulo,
+    CreatureFileError,
+    PyValueError,
+    "A creature file that is refused. `problems` is a list of (path in the document, reason)."
 );
 
 /// Input that cannot be used: `ValueError`, with the error's own words.
@@ -50,4 +58,11 @@ pub fn dataset_error(error: DatasetError) -> PyErr {
         }
         error => value_error(error),
     }
+}
+
+/// A creature file that is refused.
+pub fn creature_error(py: Python<'_>, error: BodyError) -> PyErr {
+    let raised = CreatureFileError::new_err(error.to_string());
+    let problems: Vec<_> = error.problems().into_iter().map(|p| (p.path, p.reason)).collect();
+    raised.value(py).setattr("problems", problems).err().unwrap_or(raised)
 }

@@ -1,6 +1,7 @@
 //! The Python package's native module: a shell around the crates, no logic of its own.
 
 mod character;
+mod creature;
 mod dataset;
 mod errors;
 mod model;
@@ -14,11 +15,13 @@ mod _core {
     #[pymodule_export]
     use crate::character::{Controller, Terrain, drawn_offsets};
     #[pymodule_export]
+    use crate::creature::{Arena, Creature, CreatureController, Genetic, Recorded, creature_tasks};
+    #[pymodule_export]
     use crate::dataset::{
         clip_rows, dataset_build, dataset_categories, dataset_check, dataset_plan,
     };
     #[pymodule_export]
-    use crate::errors::MotionFileError;
+    use crate::errors::{CreatureFileError, MotionFileError};
     #[pymodule_export]
     use crate::model::{Model, joint_rotations, layout, phase_shares};
     #[pymodule_export]

@@ -8,13 +8,18 @@ from typing import Any
 import click
 
 from ambulo.cli.accuracy import accuracy
+from ambulo.cli.bench import bench
 from ambulo.cli.character import import_, model, walk
+from ambulo.cli.creature import creature
 from ambulo.cli.dataset import dataset
 from ambulo.cli.demo import demo
 from ambulo.cli.evaluate import evaluate
+from ambulo.cli.evolve import evolve
 from ambulo.cli.motion import motion
+from ambulo.cli.replay import replay
 from ambulo.cli.starter import starter
 from ambulo.cli.stopping import STOPPED
+from ambulo.cli.study import study
 from ambulo.cli.train import export, train
 
 EPILOG = """Examples:
@@ -23,6 +28,8 @@ EPILOG = """Examples:
   ambulo import holden NETWORK-FOLDER -o model.safetensors
   ambulo walk model.safetensors -o out/walk
   ambulo motion convert captures/ out/ --fps 60 --mirror
+  ambulo evolve tetrapod2 run -o out/tetrapod
+  ambulo replay out/tetrapod -o out/tetrapod/replay
 
 Exit codes: 0 done, 1 something failed and was named, 2 wrong usage, 130 stopped by Ctrl-C."""
 
@@ -75,7 +82,11 @@ def completion(shell: str) -> None:
     click.echo(found(cli, {}, "ambulo", "_AMBULO_COMPLETE").source())
 
 
-for command in (dataset, demo, evaluate, export, import_, model, motion, starter, train, walk):
+COMMANDS = (
+    bench, creature, dataset, demo, evaluate, evolve, export, import_, model, motion, replay,
+    starter, study, train, walk,
+)  # fmt: skip
+for command in COMMANDS:
     cli.add_command(command)
 evaluate.add_command(accuracy)
 

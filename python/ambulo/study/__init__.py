@@ -1,0 +1,1 @@
+"""Published studies measured again, and the pages that show what came out."""
