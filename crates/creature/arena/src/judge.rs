@@ -135,16 +135,20 @@ impl Seen<'_> {
         None
     }
 
-    /// Why it does not carry itself, if so.
+    /// Why it does not carry itself, if so. Not asked of creatures without legs: they may lie and
+    /// roll, as the seed's Apod does and is called usable (section 5.2.1).
     pub fn posture(&self, judgement: &Judgement) -> Vec<String> {
         let mut reasons = Vec::new();
+        if self.body.legs().is_empty() {
+            return reasons;
+        }
         if judgement.upright <= 0.95 {
             reasons.push(format!(
                 "upright in {:.0} % of the steps, 95 % are needed",
                 100.0 * judgement.upright
             ));
         }
-        if !self.body.legs().is_empty() && judgement.torso_contact >= 0.05 {
+        if judgement.torso_contact >= 0.05 {
             reasons.push(format!(
                 "its torso is on the ground in {:.0} % of the steps, 5 % at most",
                 100.0 * judgement.torso_contact

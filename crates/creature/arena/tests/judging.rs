@@ -165,6 +165,30 @@ fn an_idle_leg_is_named() {
     }
 }
 
+/// Without legs it may lie on its torso and roll, but no joint may be idle.
+#[test]
+fn a_creature_without_legs_is_asked_for_all_joints_and_not_for_posture() {
+    let mut rolls = Made::trot();
+    rolls.arena = short("apod", "run", 2000, 3);
+    let body = rolls.arena.body();
+    let (parts, joints) = (body.parts().len(), body.driven().len());
+    let wave = |step: usize, joint: usize| 0.3 * (step as f32 * 0.2 + joint as f32).sin();
+    let all = |still: usize| {
+        let of = move |step| {
+            (0..joints).map(move |joint| if joint == still { 0.0 } else { wave(step, joint) })
+        };
+        (0..=STEPS).flat_map(of).collect()
+    };
+    rolls.rollout.touching = vec![true; (STEPS + 1) * parts];
+    rolls.rollout.tilt.fill(2.0);
+    rolls.rollout.commands = vec![0.5; STEPS * joints];
+    rolls.rollout.torques = vec![20.0; STEPS * joints];
+    rolls.rollout.angles = all(joints);
+    assert!(rolls.judged().usable, "{:?}", rolls.judged().reasons);
+    rolls.rollout.angles = all(2);
+    assert_eq!(rolls.reason(), "idle: front 3");
+}
+
 #[test]
 fn a_motion_that_was_lost_is_not() {
     let mut lost = Made::trot();
