@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use ambulo_body::Body;
 use ambulo_evolve::{EvolveError, Genetic};
 use ambulo_pilot::{Pilot, PilotError};
-use ambulo_world::{World, WorldError};
+use ambulo_world::{Ground, World, WorldError};
 
 use crate::episode::{Walker, run};
 use crate::judge::judge;
@@ -14,8 +14,10 @@ use crate::record::{Rollout, record};
 use crate::terms::{Meter, Terms, Wanted};
 use crate::{Judgement, Settings, Task};
 
-/// The most individuals that share a world: more of them no longer save time.
-const LANES: usize = 8;
+/// The most individuals that share a world, and the most parts of all of them: a world costs time of
+/// its own, but the engine looks through all parts that are near each other.
+const MOST_TOGETHER: usize = 12;
+const MOST_PARTS_TOGETHER: usize = 48;
 
 /// Why an arena cannot be made, or a genome not be tried.
 #[derive(Debug, thiserror::Error)]
@@ -147,8 +149,10 @@ impl Arena {
         wanted: Wanted,
     ) -> Result<Vec<Score>, ArenaError> {
         let threads = threads.clamp(1, genomes.len().max(1));
-        let lanes =
-            if self.settings.world.ground == ambulo_world::Ground::Flat { LANES } else { 1 };
+        let lanes = match self.settings.world.ground {
+            Ground::Flat => (MOST_PARTS_TOGETHER / self.body.parts().len()).clamp(1, MOST_TOGETHER),
+            _ => 1,
+        };
         // Batches of one size, as many for each thread.
         let count = threads * genomes.len().div_ceil(threads * lanes);
         let bounds = |batch: usize| batch * genomes.len() / count.max(1);

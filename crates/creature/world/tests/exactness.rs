@@ -12,7 +12,7 @@ fn a_path_does_not_depend_on_who_shares_the_world() {
     for name in CREATURES {
         let body = starter(name);
         let expected = path(&mut alone(&body, &Physics::default()), &body, 0, 0, 400);
-        for company in [2, 3, 8] {
+        for company in [2, 3, 12] {
             let mut world = World::new(&body, &Physics::default(), company).unwrap();
             let got = path(&mut world, &body, 0, 0, 400);
             assert_eq!(got, expected, "{name} with {} others", company - 1);
