@@ -151,6 +151,8 @@ bench: setup $(VENV)/.bench ## Measure, beside what others make (ARGS=... goes t
 	@for bench in benches/*.py; do \
 		printf '\n==> %s\n' "$$bench"; $(BIN)/python "$$bench" $(ARGS) || exit 1; \
 	done
+	$(call say,Creatures: steps a second)
+	$(BIN)/ambulo bench evolve
 
 # RUSTC_BOOTSTRAP lets the stable compiler take the sanitizer flags of cargo-fuzz.
 fuzz: $(VENV)/.packages ## Fuzz every target for TIME=30 seconds each (needs a C++ compiler)

@@ -25,10 +25,9 @@ MEASURES = {
 
 def cards(study: Results, folder: Path) -> Markup:
     """Of the cases that have a run; `folder` is where their pictures lie."""
-    intro = (
-        "One card a case, of the best of its first three runs after the last generation. Films are "
-        "folded up until asked for."
-    )
+    intro = "One card a case, of the best of its first three runs after the last generation."
+    if any(case.film for case in study.cases):
+        intro += " Films are folded up until asked for."
     of_cases = (_card(study, case, folder) for case in study.cases if case.runs)
     return join([tag("p", intro), tag("div", *of_cases, class_="cards")])
 
