@@ -19,7 +19,7 @@ from ambulo._core import Arena, Creature, creature_tasks
 from ambulo.cli.stopping import STOPPED, held_back
 from ambulo.creature import load_creature
 from ambulo.evolution import Evolution, Generation
-from ambulo.executors import Executor, check_ray, default_threads, on_ray, on_threads
+from ambulo.executors import Executor, check_ray, on_ray, on_threads
 
 if TYPE_CHECKING:
     from ambulo._core import CreatureFacts
@@ -212,7 +212,7 @@ def _executing(
     run: Evolution, executor: str, threads: int | None, address: str | None
 ) -> Iterator[Executor]:
     if executor == "local":
-        yield on_threads(run.arena, threads or default_threads())
+        yield on_threads(run.arena, threads)
     else:
         with on_ray(run.creature, run.arena, address) as tried:
             yield tried

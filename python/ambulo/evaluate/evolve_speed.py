@@ -8,8 +8,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from ambulo._core import Arena, Creature
 from ambulo.creature import description
 from ambulo.evaluate.machine import machine
@@ -117,7 +115,7 @@ def _ratios(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
                         "creature": own["creature"],
                         "threads": own["threads"],
                         "over": peer["engine"],
-                        "ratio": round(float(np.float64(ratio)), 3),
+                        "ratio": round(ratio, 3),
                     }
                 )
     return rows

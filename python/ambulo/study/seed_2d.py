@@ -121,15 +121,12 @@ def _checked(plan: Plan, folder: Path, creature: str, task: str, seed: int) -> E
     return run
 
 
-def gather(plan: Plan, watch: Callable[[float], Any] = lambda done: None) -> dict[str, Any]:
+def gather(plan: Plan) -> dict[str, Any]:
     """What the runs came to, judged at the seed's moments; pictures are drawn on the way.
 
     Writes `results.json` and gives what is in it.
     """
-    cases = []
-    for index, (creature, task) in enumerate(plan.cases):
-        cases.append(_case(plan, creature, task))
-        watch(index + 1)
+    cases = [_case(plan, creature, task) for creature, task in plan.cases]
     runs = [run for case in cases for run in case["runs"]]
     results = {
         "machine": machine(),

@@ -47,19 +47,23 @@ pub enum Ground {
 }
 
 impl Ground {
-    /// What is out of range, if anything: the field, what it is, what it must be.
+    /// What is out of range, if anything: the field of [`Physics`](crate::Physics), what it is, what
+    /// it must be.
     pub(crate) fn problem(&self) -> Option<(&'static str, f32, [f32; 2])> {
         let fields = match *self {
             Ground::Flat => vec![],
-            Ground::Slope { angle } => vec![("angle", angle, [-1.0, 1.0])],
+            Ground::Slope { angle } => vec![("ground.angle", angle, [-1.0, 1.0])],
             Ground::Steps { height, length } => {
-                vec![("height", height, [-1.0, 1.0]), ("length", length, [0.1, 20.0])]
+                vec![("ground.height", height, [-1.0, 1.0]), ("ground.length", length, [0.1, 20.0])]
             }
             Ground::Holes { width, between } => {
-                vec![("width", width, [0.05, 5.0]), ("between", between, [0.5, 50.0])]
+                vec![("ground.width", width, [0.05, 5.0]), ("ground.between", between, [0.5, 50.0])]
             }
             Ground::Rough { height, spacing, .. } => {
-                vec![("height", height, [0.0, 1.0]), ("spacing", spacing, [0.2, 20.0])]
+                vec![
+                    ("ground.height", height, [0.0, 1.0]),
+                    ("ground.spacing", spacing, [0.2, 20.0]),
+                ]
             }
         };
         fields.into_iter().find(|(_, value, [low, high])| !(*low..=*high).contains(value))

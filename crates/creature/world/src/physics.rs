@@ -73,18 +73,7 @@ impl Physics {
         ];
         let bad =
             fields.into_iter().find(|(_, value, [low, high])| !(*low..=*high).contains(value));
-        let ground = self.ground.problem().map(|(field, value, range)| {
-            let field = match field {
-                "angle" => "ground.angle",
-                "height" => "ground.height",
-                "length" => "ground.length",
-                "width" => "ground.width",
-                "between" => "ground.between",
-                _ => "ground.spacing",
-            };
-            (field, value, range)
-        });
-        match bad.or(ground) {
+        match bad.or_else(|| self.ground.problem()) {
             Some((field, value, range)) => Err(PhysicsError { field, value, range }),
             None => Ok(()),
         }
