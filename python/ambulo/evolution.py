@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ambulo._core import Arena, Creature, Genetic
+from ambulo._core import Arena, Creature, Search
 from ambulo.creature import load_creature
-from ambulo.executors import Executor
+from ambulo.executors import Executor, default_threads
 from ambulo.files import replacing
 
-FORMAT = 1
+FORMAT = 2
 LICENCE = "the weights are their owner's: evolved from physics alone, no data behind them"
 
 
@@ -48,12 +48,32 @@ class Generation:
     """Best fitness of this generation; NaN if nothing came of any."""
     mean: float
     """Mean of those that are numbers."""
+    steps: int
+    """Steps of its episodes."""
     best_so_far: float
-    """Best fitness up to now."""
+    """Fitness of the champion, in an episode of full length; NaN before there is one."""
     seconds: float
     """Spent on the search up to now, breaks not counted."""
     improved: bool
     """Whether there is a new champion."""
+    restarted: bool
+    """Whether the search began anew after it."""
+
+
+@dataclass(frozen=True)
+class Champion:
+    """The best that a search has found."""
+
+    genome: NDArray[np.float32]
+    """(G,)."""
+    fitness: float
+    """In an episode of full length."""
+    generation: int
+    """When it was found, from 1."""
+    robustness: dict[str, Any] | None
+    """Usable, and under which other physics; None where champions are chosen by fitness alone."""
+    good: bool
+    """Whether it is good, too."""
 
 
 def _number(value: float) -> float | None:
@@ -66,10 +86,7 @@ class Evolution:
     def __init__(self, folder: Path, creature: Creature, arena: Arena) -> None:
         self.folder, self.creature, self.arena = folder, creature, arena
         self.settings: dict[str, Any] = json.loads(arena.settings())
-        self.search: Genetic = arena.search()
-        self.best_fitness = -np.inf
-        self.best_genome: NDArray[np.float32] | None = None
-        self.best_generation = 0
+        self.search: Search = arena.search()
         self.seconds = 0.0
         self._resumed: dict[str, Any] | None = None
         """What `run.json` says from the next step on, of a run that was resumed and not yet gone on
@@ -135,12 +152,8 @@ class Evolution:
         run = cls(folder, creature, Arena(creature, json.dumps(settings)))
         held = _read(folder / "checkpoint.json")
         try:
-            run.search = Genetic.restore(json.dumps(held["search"]))
+            run.search = run.arena.restore(json.dumps(held["search"]))
             run.seconds = float(held["seconds"])
-            run.best_generation = int(held["best_generation"])
-            if held["best_genome"] is not None:
-                run.best_genome = np.array(held["best_genome"], np.float32)
-                run.best_fitness = float.fromhex(held["best_fitness"])
         except (KeyError, TypeError, ValueError) as error:
             raise RunError(f"{folder / 'checkpoint.json'}: {error}; start a new run") from error
         run._resumed = asked
@@ -169,107 +182,142 @@ class Evolution:
 
     # -- searching ---------------------------------------------------------------------------
 
-    def step(self, executor: Executor) -> Generation:
+    def step(self, executor: Executor, threads: int | None = None) -> Generation:
         """One generation: tries it, notes how it did, saves everything.
 
+        `threads`: of the replays that champions are chosen on; all processors by default.
+
         Raises:
-            RuntimeError: a champion's replay differs from its fitness, which must never be.
+            RuntimeError: a champion's replay differs from its scores, which must never be.
         """
         self._go_on()
         began = time.perf_counter()
-        genomes = self.search.ask()
-        fitness = np.asarray(executor(genomes), np.float64)
-        self.search.tell(fitness.tolist())
-        finite = np.isfinite(fitness)
-        best = int(np.argmax(np.where(finite, fitness, -np.inf)))
-        improved = bool(finite.any() and fitness[best] > self.best_fitness)
+        genomes, steps = self.search.ask(), self.search.steps(self.arena)
+        scores = executor(genomes, steps)
+        told = self.search.tell(self.arena, scores, threads or default_threads())
         line: dict[str, Any] = {
             "generation": self.generation,
-            "best": _number(fitness[best]),
-            "mean": _number(fitness[finite].mean()) if finite.any() else None,
+            "best": _number(told["best"]),
+            "mean": _number(told["mean"]),
+            "steps": told["steps"],
         }
-        if improved:
-            self.best_fitness, self.best_generation = float(fitness[best]), self.generation
-            self.best_genome = genomes[best].copy()
+        if told["restarted"]:
+            line["restarted"] = True
+        champion = self.champion
+        if told["crowned"]:
+            assert champion is not None
+            self._check(champion, genomes, scores, steps)
             line["champion"] = f"champions/{_champion(self.generation)}"
-            line["terms"] = self._crown()
+            line["terms"] = self._crown(champion)
+            if champion.robustness is not None:
+                line["robustness"], line["good"] = champion.robustness, champion.good
         self.seconds += time.perf_counter() - began
-        line["best_so_far"] = _number(self.best_fitness)
+        best_so_far = float("nan") if champion is None else champion.fitness
+        line["best_so_far"] = _number(best_so_far)
         line["seconds"] = round(self.seconds, 3)
         with (self.folder / "history.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
         self._save()
         return Generation(
             generation=self.generation,
-            best=fitness[best] if finite.any() else float("nan"),
-            mean=float(fitness[finite].mean()) if finite.any() else float("nan"),
-            best_so_far=self.best_fitness,
+            best=told["best"],
+            mean=told["mean"],
+            steps=told["steps"],
+            best_so_far=best_so_far,
             seconds=self.seconds,
-            improved=improved,
+            improved=told["crowned"],
+            restarted=told["restarted"],
+        )
+
+    @property
+    def champion(self) -> Champion | None:
+        """The best that was found."""
+        found = self.search.champion()
+        if found is None:
+            return None
+        robustness = found["robustness"]
+        return Champion(
+            genome=found["genome"],
+            fitness=found["fitness"],
+            generation=found["generation"],
+            robustness=None if robustness is None else json.loads(robustness),
+            good=found["good"],
         )
 
     def steps(
         self,
         executor: Executor,
         *,
+        threads: int | None = None,
         minutes: float | None = None,
+        until: str | None = None,
         stop: Callable[[], bool] = lambda: False,
     ) -> Iterator[Generation]:
-        """One by one until all are done, or `minutes` are up, or `stop` says so."""
+        """One by one until all are done, or `minutes` are up, or `stop` says so.
+
+        Or until the champion is what `until` asks for: `usable`, `robust` or `good`. `threads` as
+        in `step`.
+        """
         self._go_on()
-        until = None if minutes is None else time.perf_counter() + 60.0 * minutes
+        end = None if minutes is None else time.perf_counter() + 60.0 * minutes
         while self.generation < self.generations and not stop():
-            yield self.step(executor)
-            if until is not None and time.perf_counter() >= until:
+            if until is not None and self.search.has(until):
+                break
+            yield self.step(executor, threads)
+            if end is not None and time.perf_counter() >= end:
                 break
 
-    def _crown(self) -> dict[str, float]:
-        """Writes the champion's file; gives its terms, all of them."""
-        assert self.best_genome is not None
-        again, terms = self.arena.score(self.best_genome)
-        if again != self.best_fitness:
+    def _check(
+        self,
+        champion: Champion,
+        genomes: NDArray[np.float32],
+        scores: NDArray[np.float64],
+        steps: int,
+    ) -> None:
+        """Whether a new champion does here what it did where it was tried."""
+        index = int(np.argmax((genomes == champion.genome).all(1)))
+        found, (again,) = scores[index], self.arena.evaluate(champion.genome[None], 1, steps)
+        if not np.array_equal(again, found):
             raise RuntimeError(
-                f"a champion's replay reached {again!r} and not {self.best_fitness!r}: please "
+                f"a champion's replay reached {again.tolist()} and not {found.tolist()}: please "
                 "report this with the run's folder"
             )
-        content = self._controller(terms)
+
+    def _crown(self, champion: Champion) -> dict[str, float]:
+        """Writes the champion's file; gives its terms, all of them."""
+        _, terms = self.arena.score(champion.genome)
+        content = self._controller(champion, terms)
         path = self.folder / "champions" / _champion(self.generation)
         for target in (path, self.folder / "best.safetensors"):
             with replacing(target) as part:
                 part.write_bytes(content)
         return terms
 
-    def _controller(self, terms: dict[str, float]) -> bytes:
+    def _controller(self, champion: Champion, terms: dict[str, float]) -> bytes:
         """The champion as a controller's file."""
-        assert self.best_genome is not None
         record = {
-            "fitness": self.best_fitness,
+            "fitness": champion.fitness,
             # To the last bit, whatever happens to decimal digits on the way.
-            "fitness_hex": self.best_fitness.hex(),
-            "generation": self.best_generation,
+            "fitness_hex": champion.fitness.hex(),
+            "generation": champion.generation,
             "terms": terms,
         }
+        if champion.robustness is not None:
+            record.update(robustness=champion.robustness, good=champion.good)
         provenance = {
             "tool": f"ambulo {version('ambulo')}",
             "source": f"evolved: {self.settings['task']['name']}",
             "seed": str(self.settings["seed"]),
         }
         return self.arena.controller(
-            self.best_genome,
+            champion.genome,
             LICENCE,
             json.dumps(provenance),
             json.dumps({"arena": self.settings, "record": record}),
         )
 
     def _save(self) -> None:
-        best = self.best_genome
-        held = {
-            "search": json.loads(self.search.state()),
-            "seconds": self.seconds,
-            "best_fitness": self.best_fitness.hex() if best is not None else None,
-            "best_generation": self.best_generation,
-            "best_genome": None if best is None else [float(gene) for gene in best],
-        }
+        held = {"search": json.loads(self.search.state()), "seconds": self.seconds}
         _write(self.folder / "checkpoint.json", json.dumps(held))
 
     def _forget(self, after: int) -> None:
@@ -290,7 +338,11 @@ class Evolution:
 
 
 def read_history(folder: Path) -> list[dict[str, Any]]:
-    """A run's generations: generation, best, mean, best_so_far, seconds, and of champions terms."""
+    """A run's generations: generation, best, mean, steps, best_so_far, seconds.
+
+    After those that were the last of their search restarted; of champions also champion (their
+    file), terms and, where they are chosen on replays, robustness and good.
+    """
     lines = (folder / "history.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
     # A run that goes on, or was killed, may be in the middle of its last line.
     return [json.loads(line) for line in lines if line.endswith("\n")]
@@ -304,12 +356,8 @@ def population_of(folder: Path) -> tuple[int, NDArray[np.float32]]:
     """
     if not Evolution.exists(folder):
         raise RunError(f"{folder} holds no run")
-    held = _read(folder / "checkpoint.json")
-    try:
-        search = Genetic.restore(json.dumps(held["search"]))
-        return search.generation + 1, search.ask()
-    except (KeyError, ValueError) as error:
-        raise RunError(f"{folder / 'checkpoint.json'}: {error}") from error
+    run = Evolution.resume(folder)
+    return run.generation + 1, run.search.ask()
 
 
 def champion_at(folder: Path, generation: int) -> Path | None:

@@ -19,13 +19,22 @@ from ambulo.evolution import LICENCE
 from ambulo.rollout import Rollout
 
 SMALL: dict[str, Any] = {
+    "preset": "seed",
     "generations": 6,
     "seed": 3,
     "evolution": {"population": 8},
     "task": {"name": "run", "steps": 60},
 }
 # The same as a configuration file.
-TOML = "generations = 6\nseed = 3\n[evolution]\npopulation = 8\n[task]\nsteps = 60\n"
+TOML = """
+preset = "seed"
+generations = 6
+seed = 3
+[evolution]
+population = 8
+[task]
+steps = 60
+"""
 
 
 def ambulo(*arguments: object) -> Result:

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
+from itertools import product
 from typing import Any
 
 import pytest
 
+from ambulo._core import Arena
 from ambulo.creature import load_creature
 from ambulo.evaluate import evolve_speed
-from ambulo.evaluate.evolve_speed import compare, engines
+from ambulo.evaluate.evolve_speed import LANES, compare, engines
 from ambulo.evaluate.machine import machine
-from creature_runs import ambulo, said
+from creature_runs import SMALL, ambulo, said
 
 TINY = ("--population", 3, "--steps", 10, "--repeats", 2)
+
+
+def has(lanes: int) -> bool:
+    """Whether this machine has so many."""
+    with contextlib.suppress(ValueError):
+        return bool(Arena(load_creature("biped1"), json.dumps(SMALL), lanes))
+    return False
+
+
+OURS = [
+    "lockstep", *(f"lockstep, {name}" for lanes, name in LANES.items() if has(lanes)), "box2d",
+]  # fmt: skip
 
 
 def measured(peers: bool, **changes: Any) -> dict[str, Any]:
@@ -30,28 +45,32 @@ def rows(found: dict[str, Any]) -> list[tuple[str, str, int]]:
 
 def test_every_engine_is_measured_on_every_creature() -> None:
     pytest.importorskip("pyb2d3")
-    done: list[int] = []
+    done: list[float] = []
     found = measured(peers=True, watch=done.append)
     assert rows(found) == [
         (engine, creature, threads)
         for creature in ("biped1", "tetrapod1")
-        for engine, threads in (("box2d", 1), ("box2d", 2), ("pyb2d3", 1))
+        for engine, threads in [*product(OURS, (1, 2)), ("pyb2d3", 1)]
     ]
     for row in found["results"]:
         assert 0 < row["least"] <= row["char_steps_per_s"] <= row["most"]
     assert (found["population"], found["steps"], found["repeats"]) == (3, 10, 3)
     # One more each that warms up.
-    assert done == list(range(1, 6 * 4 + 1))
+    runs = len(found["results"]) * 4
+    assert done == [run / runs for run in range(1, runs + 1)]
     speeds = {
         (row["engine"], row["creature"], row["threads"]): row["char_steps_per_s"]
         for row in found["results"]
     }
-    assert [(row["creature"], row["threads"], row["over"]) for row in found["ratios"]] == [
-        (creature, threads, "pyb2d3") for creature in ("biped1", "tetrapod1") for threads in (1, 2)
-    ]
+    ratios = {(row["creature"], row["threads"], row["over"]) for row in found["ratios"]}
+    others = [*OURS[1:], "pyb2d3"]
+    assert ratios == set(product(("biped1", "tetrapod1"), (1, 2), others))
+    assert len(found["ratios"]) == len(ratios)
     for row in found["ratios"]:
-        own = speeds["box2d", row["creature"], row["threads"]]
-        assert row["ratio"] == round(own / speeds["pyb2d3", row["creature"], 1], 3)
+        own = speeds["lockstep", row["creature"], row["threads"]]
+        # It has one thread only.
+        beside = 1 if row["over"] == "pyb2d3" else row["threads"]
+        assert row["ratio"] == round(own / speeds[row["over"], row["creature"], beside], 3)
 
 
 def test_engines_take_turns_and_the_median_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +82,7 @@ def test_engines_take_turns_and_the_median_is_said(monkeypatch: pytest.MonkeyPat
             order.append(name)
             return next(speeds[name])
 
-        return {("box2d", 1): lambda: measure("a"), ("other", 1): lambda: measure("b")}
+        return {("lockstep", 1): lambda: measure("a"), ("other", 1): lambda: measure("b")}
 
     monkeypatch.setattr(evolve_speed, "engines", made)
     found = compare(
@@ -79,21 +98,21 @@ def test_a_measurement_is_of_character_steps_a_second(monkeypatch: pytest.Monkey
     made = engines(
         load_creature("biped1"), population=3, steps=10, threads=[1], peers=False, seed=1
     )  # fmt: skip
-    clock = iter([5.0, 5.5])
-    monkeypatch.setattr(evolve_speed.time, "perf_counter", lambda: next(clock))
-    assert made["box2d", 1]() == 3 * 10 / 0.5
+    for engine in OURS:
+        clock = iter([5.0, 5.5])
+        monkeypatch.setattr(evolve_speed.time, "perf_counter", clock.__next__)
+        assert made[engine, 1]() == 3 * 10 / 0.5
 
 
 def test_the_report_as_json() -> None:
     run = ambulo("bench", "evolve", "--creature", "biped1", *TINY, "--threads", 1, "--no-peers",
                  "--json")  # fmt: skip
     found = said(run)
-    assert set(found) >= {"machine", "results"} and found["ratios"] == []
-    (row,) = found["results"]
-    assert {key: row[key] for key in ("engine", "creature", "threads")} == {
-        "engine": "box2d", "creature": "biped1", "threads": 1,
-    }  # fmt: skip
-    assert isinstance(row["char_steps_per_s"], int) and row["char_steps_per_s"] > 0
+    assert set(found) >= {"machine", "results"}
+    assert rows(found) == [(engine, "biped1", 1) for engine in OURS]
+    for row in found["results"]:
+        assert isinstance(row["char_steps_per_s"], int) and row["char_steps_per_s"] > 0
+    assert [row["over"] for row in found["ratios"]] == OURS[1:]
     assert set(found["machine"]) == {"cpu", "cores", "system", "python", "load"}
 
 
@@ -102,8 +121,9 @@ def test_creatures_and_threads_may_be_several_but_none_twice() -> None:
     threads = ("--threads", 2, "--threads", 1, "--threads", 2)
     run = ambulo("bench", "evolve", *creatures, *TINY, *threads, "--no-peers", "--json")
     assert rows(said(run)) == [
-        ("box2d", "biped1", 2), ("box2d", "biped1", 1), ("box2d", "apod", 2), ("box2d", "apod", 1),
-    ]  # fmt: skip
+        (engine, creature, threads)
+        for creature, engine, threads in product(("biped1", "apod"), OURS, (2, 1))
+    ]
 
 
 def test_the_table_says_each_engine_and_the_ratio() -> None:
@@ -114,10 +134,15 @@ def test_the_table_says_each_engine_and_the_ratio() -> None:
     assert lines[0].split() == [
         "engine", "creature", "threads", "character-steps/s", "least", "most",
     ]  # fmt: skip
-    assert [line.split()[:3] for line in lines[1:3]] == [
-        ["box2d", "biped1", "1"], ["pyb2d3", "biped1", "1"],
-    ]  # fmt: skip
-    assert " × pyb2d3" in lines[3] and machine()["cpu"][:20] in lines[4]
+    engines = [*OURS, "pyb2d3"]
+    table, ratios = lines[1 : len(engines) + 1], lines[len(engines) + 1 : -1]
+    for engine, line in zip(engines, table, strict=True):
+        assert line.startswith(f"{engine} ") and line.split("biped1")[1].split()[0] == "1"
+    for engine, line in zip(engines[1:], ratios, strict=True):
+        assert line.startswith("lockstep is ") and line.endswith(
+            f" × {engine} on biped1, threads: 1"
+        )
+    assert machine()["cpu"][:20] in lines[-1]
 
 
 def test_without_pyb2d3_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

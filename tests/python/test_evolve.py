@@ -20,11 +20,11 @@ from ambulo._core import Arena
 from ambulo.creature import load_controller, load_creature
 from ambulo.evolution import Evolution, RunError, champion_at
 from ambulo.executors import Executor, on_threads
-from creature_runs import SMALL, ambulo, history, outcome, said, start, text_of
+from creature_runs import SMALL, TOML, ambulo, history, outcome, said, start, text_of
 
 TERMS = {
-    "direction_change", "distance", "energy", "height", "leg_use", "rollover", "saturation",
-    "symmetry",
+    "direction_change", "distance", "energy", "height", "leg_use", "natural", "rollover",
+    "saturation", "symmetry",
 }  # fmt: skip
 
 
@@ -75,6 +75,7 @@ def test_history_has_a_complete_line_a_generation(task: str, tmp_path: Path) -> 
         improved = line["best"] > highest
         highest = max(highest, line["best"])
         assert line["mean"] <= line["best"] and line["best_so_far"] == highest
+        assert line["steps"] == 80 and "robustness" not in line
         assert ("champion" in line) == ("terms" in line) == improved
         if improved:
             champions.append(line["champion"])
@@ -124,12 +125,13 @@ def test_what_is_not_finite_is_never_a_champion(bad: float, tmp_path: Path) -> N
     honest = on_threads(run.arena, 1)
     expected: list[float] = []
 
-    def spoiled(genomes: NDArray[np.float32]) -> NDArray[np.float64]:
-        fitness = honest(genomes)
+    def spoiled(genomes: NDArray[np.float32], steps: int) -> NDArray[np.float64]:
+        scores = honest(genomes, steps)
+        fitness = scores[:, 0]
         # Whoever is best is not a number, and the first, which argmax takes if all are equal.
         fitness[[0, int(np.argmax(fitness))]] = bad
         expected.append(float(fitness[np.isfinite(fitness)].max()))
-        return fitness
+        return scores
 
     for _ in range(4):
         done = run.step(spoiled)
@@ -139,9 +141,17 @@ def test_what_is_not_finite_is_never_a_champion(bad: float, tmp_path: Path) -> N
     assert load_controller(run.folder).record["fitness"] == max(expected)
 
 
-def test_a_generation_of_which_nothing_came_is_noted_and_the_next_goes_on(tmp_path: Path) -> None:
-    run = begun(tmp_path / "run")
-    done = run.step(lambda genomes: np.full(len(genomes), np.nan))
+def nothing(genomes: NDArray[np.float32], _: int) -> NDArray[np.float64]:
+    """An executor with which nothing comes of any."""
+    return np.full((len(genomes), 4), np.nan)
+
+
+@pytest.mark.parametrize("preset", ["seed", "natural"])
+def test_a_generation_of_which_nothing_came_is_noted_and_the_next_goes_on(
+    preset: str, tmp_path: Path
+) -> None:
+    run = begun(tmp_path / "run", preset=preset)
+    done = run.step(nothing)
     assert not done.improved and np.isnan(done.best) and np.isnan(done.mean)
     (line,) = run.history()
     assert line["best"] is line["mean"] is line["best_so_far"] is None and "champion" not in line
@@ -150,7 +160,7 @@ def test_a_generation_of_which_nothing_came_is_noted_and_the_next_goes_on(tmp_pa
     for name in ("checkpoint.json", "history.jsonl", "run.json"):
         assert not re.search("NaN|Infinity", (run.folder / name).read_text())
     again = Evolution.resume(run.folder)
-    assert again.best_genome is None
+    assert again.champion is None
     assert again.step(on_threads(again.arena, 1)).improved
 
 
@@ -158,7 +168,7 @@ def test_a_run_of_which_nothing_came_says_so(
     small_config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def hopeless(*_: object) -> Executor:
-        return lambda genomes: np.full(len(genomes), np.nan)
+        return nothing
 
     monkeypatch.setattr(importlib.import_module("ambulo.cli.evolve"), "on_threads", hopeless)
     folder = tmp_path / "run"
@@ -167,13 +177,17 @@ def test_a_run_of_which_nothing_came_says_so(
     assert "6 generations, but nothing that is a number came of any" in run.output
     again = said(ambulo("evolve", "--resume", "-o", folder, "--json"))
     assert again["fitness"] is again["champion"] is again["champion_generation"] is None
+    assert again["robustness"] is again["good"] is None
 
 
-def test_a_champion_that_does_not_replay_stops_the_run(tmp_path: Path) -> None:
-    run = begun(tmp_path / "run")
+@pytest.mark.parametrize("preset", ["seed", "natural"])
+def test_a_champion_that_does_not_replay_stops_the_run(preset: str, tmp_path: Path) -> None:
+    """A cluster of machines that compute differently, say."""
+    run = begun(tmp_path / "run", preset=preset)
     with pytest.raises(RuntimeError, match=r"a champion's replay reached .* and not"):
-        run.step(lambda genomes: on_threads(run.arena, 1)(genomes) + 1e-9)
+        run.step(lambda genomes, steps: on_threads(run.arena, 1)(genomes, steps) + 1e-9)
     assert not list((run.folder / "champions").iterdir())
+    assert Evolution.resume(run.folder).generation == 0
 
 
 # -- cut short --------------------------------------------------------------------------------
@@ -258,9 +272,7 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def long_config(tmp_path: Path) -> Path:
     path = tmp_path / "long.toml"
-    path.write_text(
-        "generations = 400\nseed = 3\n[evolution]\npopulation = 8\n[task]\nsteps = 120\n"
-    )
+    path.write_text(TOML.replace("generations = 6", "generations = 400").replace("60", "120"))
     return path
 
 
@@ -338,6 +350,8 @@ def test_a_run_is_not_overwritten_unless_that_is_asked_for(
         (("--overwrite",), 2, "--resume goes on, --overwrite starts again: give one of them"),
         (("--seed", 3), 2, "a run goes on with the settings that it began with"),
         (("--population", 8), 2, "a run goes on with the settings that it began with"),
+        (("--preset", "seed"), 2, "a run goes on with the settings that it began with"),
+        (("--solver", "box2d"), 2, "a run goes on with the settings that it began with"),
         (("--config", "CONFIG"), 2, "a run goes on with the settings that it began with"),
         (("biped1", "jump"), 1, "is a run of run"),
         (("tetrapod1", "run"), 1, "is a run of another creature than tetrapod1"),
@@ -377,8 +391,8 @@ def spoil_creature(text: str) -> str:
         ("checkpoint.json", lambda text: "{}", "'search'; start a new run"),
         ("checkpoint.json", lambda text: text.replace('"genes": 62', '"genes": 61'), "genom"),
         ("checkpoint.json", lambda text: text.replace('"seconds": ', '"seconds": "x'), "start a n"),
-        ("run.json", lambda text: text.replace('"format": 1', '"format": 2'), "another version"),
-        ("run.json", lambda text: '{"format": 1}', "another version"),
+        ("run.json", lambda text: text.replace('"format": 2', '"format": 1'), "another version"),
+        ("run.json", lambda text: '{"format": 2}', "another version"),
         ("run.json", lambda text: "{", "start a new run"),
         ("creature.json", spoil_creature, "is not the creature that this run began with"),
         ("creature.json", lambda text: text.replace("hip back", "hip", 1), "$.pairs[0]"),
@@ -401,6 +415,8 @@ def test_a_broken_folder_is_refused_and_named(
 
 # -- settings ---------------------------------------------------------------------------------
 
+SEED = 'preset = "seed"\n[evolution]\n'
+
 
 @pytest.mark.parametrize(
     ("text", "says"),
@@ -410,17 +426,24 @@ def test_a_broken_folder_is_refused_and_named(
         ("generations = 0", "generations: 0 is not 1 to 10000000"),
         ("[evolution]\nmutation_rte = 0.1", "evolution.mutation_rte: unknown field"),
         ('[evolution]\nmutation_rate = "a"', "evolution.mutation_rate: invalid type"),
-        ("[evolution]\nmutation_rate = 1.5", "evolution.mutation_rate: 1.5 is not 0 to 1"),
-        ("[evolution]\npopulation = 1", "evolution.population: 1 is not 2 to 100000"),
-        ('[evolution]\nselection = "best"', "evolution.selection: unknown variant"),
+        (f"{SEED}mutation_rate = 1.5", "evolution.mutation_rate: 1.5 is not 0 to 1"),
+        (f"{SEED}population = 1", "evolution.population: 1 is not 2 to 100000"),
+        ("[evolution]\npopulation = 3", "evolution.population: 3 is not 4 to 100000"),
+        (f'{SEED}selection = "best"', "evolution.selection: unknown variant"),
+        ('[evolution]\nstrategy = "luck"', "evolution.strategy: unknown variant `luck`"),
+        ('preset = "best"', "preset: unknown variant `best`, expected `natural` or `seed`"),
         ("evolution = 3", "evolution: invalid type"),
         ("[task]\nsteps = 0", "task.steps: 0 is not 1 to 1000000"),
+        ("[task]\nsteps = 60\ngrow = [20, 90]", "task.grow: [20, 90] are not up to 100 growing"),
+        ("[search]\ntrials = 1001", "search.trials: 1001 is not 0 to 1000"),
+        ('[controller]\nkind = "brain"', "controller.kind: unknown variant `brain`"),
         ("[task.weights]\nbeauty = 1", "task.weights: no term is called 'beauty'; there are "),
         ('[task.weights]\ndistance = "x"', "task.weights.distance: invalid type"),
         ("task = 3", "task: expected a table"),
-        ('[task]\nname = "swim"', "task.name is 'swim', but 'run' is asked for"),
+        ('[task]\nname = "fly"', "task.name is 'fly', but 'run' is asked for"),
         ("[controller]\nhidden = [0]", "controller.hidden: [0] is not up to 8 layers of 1 to 256"),
         ("[world]\nrate = 0", "world.rate: 0 is not 10 to 1000"),
+        ('[world]\nsolver = "x"', "world.solver: unknown variant `x`"),
         ("[world]\nwind = 1", "world.wind: unknown field"),
         # These came as a traceback, and without the place.
         ("[task]\nsteps = 2020-01-01", "task.steps: no setting is a date or a time"),
@@ -456,8 +479,8 @@ def test_a_config_that_is_not_utf_8_is_named(tmp_path: Path) -> None:
 
 
 def test_a_task_that_is_not_known_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"task\.name: no task is called 'swim'; there are run, j"):
-        Arena(load_creature("biped1"), json.dumps({"task": {"name": "swim"}}))
+    with pytest.raises(ValueError, match=r"task\.name: no task is called 'fly'; there are run, j"):
+        Arena(load_creature("biped1"), json.dumps({"task": {"name": "fly"}}))
 
 
 def test_the_command_line_goes_over_the_config(small_config: Path, tmp_path: Path) -> None:
@@ -478,10 +501,12 @@ def test_the_command_line_goes_over_the_config(small_config: Path, tmp_path: Pat
 @pytest.mark.parametrize(
     "arguments",
     [
-        (), ("biped1",), ("biped1", "swim"), ("biped1", "run", "--population", 1),
+        (), ("biped1",), ("biped1", "fly"), ("biped1", "run", "--population", 1),
         ("biped1", "run", "--generations", 0), ("biped1", "run", "--seed", -1),
         ("biped1", "run", "--seed", 2**64), ("biped1", "run", "--minutes", 0),
         ("biped1", "run", "--threads", 0), ("biped1", "run", "--config", "nowhere.toml"),
+        ("biped1", "run", "--preset", "seed", "--until", "robust"),
+        ("biped1", "run", "--strategy", "luck"), ("biped1", "run", "--controller", "brain"),
     ],
 )  # fmt: skip
 def test_wrong_usage_is_refused_and_writes_nothing(
@@ -507,7 +532,7 @@ def test_a_dry_run_says_the_settings_and_writes_nothing(
     run = ambulo(*arguments)
     assert run.exit_code == 0 and "dry run: nothing written" in run.stderr
     assert "Biped 1: 2 driven joints, 2 legs" in run.stdout
-    assert "run: 6 generations of 8, 60 steps each, 62 weights" in run.stdout
+    assert "run: at most 6 generations of 8, 60 steps each, 62 genes, genetic" in run.stdout
     assert not list(tmp_path.iterdir())
     plan = said(ambulo(*arguments, "--json"))
     assert plan["genes"] == 62 and plan["creature"] == "Biped 1"
@@ -532,8 +557,9 @@ def test_the_report(small_config: Path, tmp_path: Path) -> None:
     assert report.pop("seconds") > 0.0
     assert report == {
         "run": str(folder), "creature": "Biped 1", "task": "run", "seed": 3, "generations": 6,
-        "resumed_from": None, "fitness": best["fitness"],
+        "resumed_from": None, "restarts": 0, "fitness": best["fitness"],
         "champion_generation": best["generation"], "champion": str(folder / "best.safetensors"),
+        "robustness": None, "good": None, "reached": None,
     }  # fmt: skip
     assert "generation 6/6" in run.stderr and "0 s left" in run.stderr
     told = ambulo("evolve", "--resume", "-o", folder)

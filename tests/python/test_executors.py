@@ -32,30 +32,62 @@ def arena(population: int = 10) -> Arena:
 
 
 @pytest.mark.parametrize("population", [3, 7, 8, 9, 25])
-def test_fitness_does_not_depend_on_threads_nor_on_who_is_beside(population: int) -> None:
+def test_scores_do_not_depend_on_threads_nor_on_who_is_beside(population: int) -> None:
     here = arena(population)
     genomes = here.search().ask()
-    alone = np.array([here.score(genome)[0] for genome in genomes])
-    assert alone.std() > 0.0
+    fitness = np.array([here.score(genome)[0] for genome in genomes])
+    alone = np.concatenate([here.evaluate(genome[None], 1) for genome in genomes])
+    assert alone.shape == (population, 4) and alone[:, 0].tolist() == fitness.tolist()
+    assert fitness.std() > 0.0 and (alone[:, 1] == 1.0).all()
+    assert ((alone[:, 2:] >= 0.0) & (alone[:, 2:] <= 1.0)).all()
     for threads in (1, 2, 3, 64, None):
-        assert on_threads(here, threads)(genomes).tolist() == alone.tolist()
-    assert on_threads(here)(genomes[::-1].copy()).tolist() == alone[::-1].tolist()
+        assert on_threads(here, threads)(genomes, 60).tolist() == alone.tolist()
+    assert on_threads(here)(genomes[::-1].copy(), 60).tolist() == alone[::-1].tolist()
+    assert (on_threads(here)(genomes, 30)[:, 0] != fitness).any()
+
+
+def lanes_here() -> list[int]:
+    """As this machine says when it is asked for a number that none has."""
+    with pytest.raises(ValueError, match=r"^lanes: 3; this machine has 1(, \d+)*$") as caught:
+        Arena(load_creature("tetrapod1"), json.dumps(SMALL), lanes=3)
+    return [int(lanes) for lanes in str(caught.value).partition("has ")[2].split(", ")]
+
+
+def test_any_number_of_lanes_gives_the_same_bits() -> None:
+    body = load_creature("tetrapod1")
+    settings = json.dumps({"task": {"name": "run", "steps": 90}, "evolution": {"population": 19}})
+    here = Arena(body, settings)
+    genomes = here.search().ask()
+    expected = here.evaluate(genomes, 1)
+    assert expected[:, 0].std() > 0.0
+    for lanes in lanes_here():
+        other = Arena(body, settings, lanes=lanes)
+        assert other.evaluate(genomes, 2).tolist() == expected.tolist()
+        assert other.robustness(genomes[:3], 1) == here.robustness(genomes[:3], 2)
+        assert other.record(genomes[0], 90).hash == here.record(genomes[0], 90).hash
+
+
+@pytest.mark.parametrize("lanes", [0, 2, 3, 1000])
+def test_a_number_of_lanes_that_no_machine_has_is_refused(lanes: int) -> None:
+    known = ", ".join(map(str, lanes_here()))
+    with pytest.raises(ValueError, match=f"^lanes: {lanes}; this machine has {known}$"):
+        Arena(load_creature("tetrapod1"), json.dumps(SMALL), lanes=lanes)
 
 
 def test_all_processors_are_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
     assert default_threads() >= 1
-    asked: list[int] = []
+    asked: list[tuple[int, int]] = []
 
     class Noting:
-        def evaluate(self, genomes: object, threads: int) -> object:
-            asked.append(threads)
+        def evaluate(self, genomes: object, threads: int, steps: int) -> object:
+            asked.append((threads, steps))
             return genomes
 
     monkeypatch.setattr(executors, "default_threads", lambda: 5)
     noting: Any = Noting()
-    on_threads(noting)(np.zeros((1, 1), np.float32))
-    on_threads(noting, 3)(np.zeros((1, 1), np.float32))
-    assert asked == [5, 3]
+    on_threads(noting)(np.zeros((1, 1), np.float32), 7)
+    on_threads(noting, 3)(np.zeros((1, 1), np.float32), 8)
+    assert asked == [(5, 7), (3, 8)]
 
 
 # -- Ray, or none -----------------------------------------------------------------------------
@@ -141,16 +173,17 @@ genomes = arena.search().ask()
 command = ["evolve", "biped1", "run", "--config", config, "--executor", "ray", "-o"]
 with executors.on_ray(creature, arena) as tried:
     workers = ray.cluster_resources()["CPU"]
-    spread = [tried(genomes).tolist(), tried(genomes[:1]).tolist()]
+    spread = [tried(genomes, 60).tolist(), tried(genomes[:1], 30).tolist()]
     # One cluster for all who want one: this does not end it.
     inside = CliRunner().invoke(cli, [*command, folder + "/inside"])
-    still = ray.is_initialized() and tried(genomes[:1]).tolist() == spread[1]
+    still = ray.is_initialized() and tried(genomes[:1], 30).tolist() == spread[1]
     address = ray.get_runtime_context().gcs_address
     outside = subprocess.run(
         [sys.executable, "-m", "ambulo", *command, folder + "/outside", "--ray-address", address],
         capture_output=True, text=True,
     )
-threads = executors.on_threads(arena, 2)(genomes).tolist()
+on_threads = executors.on_threads(arena, 2)
+threads = [on_threads(genomes, 60).tolist(), on_threads(genomes[:1], 30).tolist()]
 print(json.dumps({
     "workers": workers, "spread": spread, "threads": threads, "still": still,
     "inside": [inside.exit_code, inside.output],
@@ -176,13 +209,12 @@ def with_ray(
     return folder, json.loads(run.stdout.splitlines()[-1])
 
 
-def test_a_cluster_gives_the_same_fitness_to_the_last_bit(
+def test_a_cluster_gives_the_same_scores_to_the_last_bit(
     with_ray: tuple[Path, dict[str, Any]],
 ) -> None:
     _, found = with_ray
-    assert found["workers"] == 2 and len(found["threads"]) == 10
-    whole, single = found["spread"]
-    assert whole == found["threads"] and single == found["threads"][:1]
+    assert found["workers"] == 2 and len(found["threads"][0]) == 10
+    assert found["spread"] == found["threads"]
 
 
 def test_a_cluster_that_was_there_stays_and_our_own_ends(

@@ -60,7 +60,8 @@ def test_the_creatures_and_settings_are_the_seeds(tmp_path: Path) -> None:
     assert len(plan.cases) == 14 and plan.cases[0] == ("apod", "run")
     assert (plan.runs, plan.generations, plan.population) == (10, 300, 50)
     assert plan.settings("jump", 4) == {
-        "generations": 300, "seed": 4, "evolution": {"population": 50}, "task": {"name": "jump"},
+        "preset": "seed", "generations": 300, "seed": 4, "evolution": {"population": 50},
+        "task": {"name": "jump"},
     }  # fmt: skip
 
 
@@ -192,7 +193,7 @@ def test_a_dry_run_says_how_much_it_is_and_writes_nothing(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     "arguments",
-    [("--creature", "raptor"), ("--task", "swim"), ("--runs", 0), ("--generations", 0)],
+    [("--creature", "raptor"), ("--task", "fly"), ("--runs", 0), ("--generations", 0)],
 )
 def test_wrong_usage_is_refused(arguments: tuple[object, ...], tmp_path: Path) -> None:
     run = ambulo("study", "seed-2d", "-o", tmp_path / "study", *arguments)
@@ -207,8 +208,8 @@ def test_running_is_judged_at_the_seeds_moments(
     monkeypatch.setattr(
         Plan, "settings",
         lambda plan, task, seed: {
-            "generations": plan.generations, "seed": seed, "evolution": {"population": 4},
-            "task": {"name": task, "steps": 20},
+            "preset": "seed", "generations": plan.generations, "seed": seed,
+            "evolution": {"population": 4}, "task": {"name": task, "steps": 20},
         },
     )  # fmt: skip
     plan = Plan(tmp_path / "study", ("biped1",), ("run",), runs=4, generations=80)

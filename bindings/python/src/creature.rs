@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use ambulo_arena as arena;
 use ambulo_body::Body;
-use ambulo_evolve as evolve;
-use ambulo_pilot::{Pilot, PilotScratch, Senses};
-use numpy::ndarray::{Array1, Array2, Array3};
+use ambulo_lanes::Width;
+use ambulo_pilot::{Kind, Pilot, PilotScratch, Senses};
+use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -71,9 +71,22 @@ pub struct Arena {
     arena: arena::Arena,
 }
 
-/// (N, G) as a list of genomes.
-fn genomes(array: &PyReadonlyArray2<'_, f32>) -> Vec<Vec<f32>> {
-    array.as_array().rows().into_iter().map(|row| row.to_vec()).collect()
+impl Arena {
+    /// (N, G) as a list of genomes; where they may differ in length, what fills them up is taken off.
+    fn genomes(&self, array: &PyReadonlyArray2<'_, f32>) -> Vec<Vec<f32>> {
+        let rows = array.as_array();
+        rows.rows().into_iter().map(|row| self.genome(&row.to_vec())).collect()
+    }
+
+    fn genome(&self, row: &[f32]) -> Vec<f32> {
+        let whole = match self.arena.settings().controller.kind {
+            Some(Kind::Graph) => {
+                row.iter().rposition(|gene| !gene.is_nan()).map_or(0, |last| last + 1)
+            }
+            _ => row.len(),
+        };
+        row[..whole].to_vec()
+    }
 }
 
 fn by_name(terms: &arena::Terms) -> BTreeMap<&'static str, f64> {
@@ -82,12 +95,21 @@ fn by_name(terms: &arena::Terms) -> BTreeMap<&'static str, f64> {
 
 #[pymethods]
 impl Arena {
-    /// `settings` is JSON text; what it leaves out is as the defaults are.
+    /// `settings` is JSON text; what it leaves out is as the defaults are. `lanes`: how many
+    /// individuals are stepped together, 1, 4, 8 or 16; as many as this machine has if left out. The
+    /// results are the same.
     #[new]
-    fn new(creature: &Creature, settings: &str) -> PyResult<Self> {
+    #[pyo3(signature = (creature, settings, lanes=None))]
+    fn new(creature: &Creature, settings: &str, lanes: Option<usize>) -> PyResult<Self> {
         let settings = arena::Settings::parse(settings).map_err(value_error)?;
         let arena = arena::Arena::new(creature.body.clone(), settings).map_err(value_error)?;
-        Ok(Self { arena })
+        let Some(lanes) = lanes else { return Ok(Self { arena }) };
+        let width = Width::available().find(|width| width.lanes() == lanes);
+        let width = width.ok_or_else(|| {
+            let known: Vec<_> = Width::available().map(|width| width.lanes().to_string()).collect();
+            value_error(format!("lanes: {lanes}; this machine has {}", known.join(", ")))
+        })?;
+        Ok(Self { arena: arena.with_width(width) })
     }
 
     /// The settings with everything said, as JSON text.
@@ -101,27 +123,68 @@ impl Arena {
         self.arena.genes()
     }
 
+    /// How many individuals are stepped together.
+    #[getter]
+    fn lanes(&self) -> usize {
+        self.arena.width().lanes()
+    }
+
     /// Physics steps of an episode.
     #[getter]
     fn steps(&self) -> u32 {
         self.arena.steps()
     }
 
-    /// The search at its start.
-    fn search(&self) -> PyResult<Genetic> {
-        Ok(Genetic { search: self.arena.search().map_err(value_error)? })
+    /// Physics steps of the episodes of each stage; the last is of full length.
+    #[getter]
+    fn stages(&self) -> Vec<u32> {
+        self.arena.stages()
     }
 
-    /// (N, G) genomes to (N,) fitness, on so many threads; NaN where nothing came of it.
+    /// The search at its start.
+    fn search(&self) -> PyResult<Search> {
+        Ok(Search { search: arena::Evolution::new(&self.arena).map_err(value_error)? })
+    }
+
+    /// A stored search, to go on with.
+    fn restore(&self, state: &str) -> PyResult<Search> {
+        let search: arena::Evolution = serde_json::from_str(state).map_err(value_error)?;
+        search.check(&self.arena).map_err(value_error)?;
+        Ok(Search { search })
+    }
+
+    /// (N, G) genomes to (N, 4) scores in episodes of so many steps (of full length if left out):
+    /// fitness (NaN where nothing came of it), share of the episode before a fall, two numbers that
+    /// say what kind of motion it is.
+    #[pyo3(signature = (array, threads, steps=None))]
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
         array: PyReadonlyArray2<'py, f32>,
         threads: usize,
-    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let genomes = genomes(&array);
-        let scores = py.detach(|| self.arena.evaluate(&genomes, threads)).map_err(value_error)?;
-        Ok(Array1::from_iter(scores.into_iter().map(|score| score.fitness)).into_pyarray(py))
+        steps: Option<u32>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let genomes = self.genomes(&array);
+        let steps = steps.unwrap_or(self.arena.steps());
+        let scores = py.detach(|| self.arena.evaluate(&genomes, steps, threads));
+        let row = |score: arena::Score| {
+            [score.fitness, score.alive, score.behaviour[0], score.behaviour[1]]
+        };
+        let rows: Vec<f64> = scores.map_err(value_error)?.into_iter().flat_map(row).collect();
+        Ok(Recorded::rows(py, rows, 4))
+    }
+
+    /// How each genome's motion holds up under other physics, as JSON text.
+    fn robustness(
+        &self,
+        py: Python<'_>,
+        array: PyReadonlyArray2<'_, f32>,
+        threads: usize,
+    ) -> PyResult<String> {
+        let genomes = self.genomes(&array);
+        let found = py.detach(|| self.arena.robustness(&genomes, threads)).map_err(value_error)?;
+        serde_json::to_string(&found.iter().map(robustness).collect::<Vec<_>>())
+            .map_err(value_error)
     }
 
     /// Fitness of one genome, and all its terms by name.
@@ -129,7 +192,8 @@ impl Arena {
         &self,
         genome: PyReadonlyArray1<'_, f32>,
     ) -> PyResult<(f64, BTreeMap<&'static str, f64>)> {
-        let score = self.arena.score(&genome.as_array().to_vec()).map_err(value_error)?;
+        let score =
+            self.arena.score(&self.genome(&genome.as_array().to_vec())).map_err(value_error)?;
         Ok((score.fitness, by_name(&score.terms)))
     }
 
@@ -140,7 +204,7 @@ impl Arena {
         genome: PyReadonlyArray1<'_, f32>,
         steps: u32,
     ) -> PyResult<Recorded> {
-        let genome = genome.as_array().to_vec();
+        let genome = self.genome(&genome.as_array().to_vec());
         let rollout = py.detach(|| self.arena.record(&genome, steps)).map_err(value_error)?;
         let parts = self.arena.body().parts().len();
         Ok(Recorded { rollout, parts, joints: self.arena.body().driven().len() })
@@ -160,7 +224,8 @@ impl Arena {
         provenance: &str,
         parts: &str,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let pilot = self.arena.pilot(&genome.as_array().to_vec()).map_err(value_error)?;
+        let pilot =
+            self.arena.pilot(&self.genome(&genome.as_array().to_vec())).map_err(value_error)?;
         let provenance = serde_json::from_str(provenance).map_err(value_error)?;
         let parts = serde_json::from_str(parts).map_err(value_error)?;
         let rate = f64::from(self.arena.settings().world.rate);
@@ -236,22 +301,35 @@ impl Recorded {
     }
 }
 
-/// The seed's genetic algorithm with its whole state.
+/// What is told of how a motion holds up.
+fn robustness(found: &arena::Robustness) -> serde_json::Value {
+    serde_json::json!({
+        "robust": found.is_robust(),
+        "usable": found.usable,
+        "friction": found.friction,
+        "mass": found.mass,
+        "pushes": found.pushes,
+    })
+}
+
+/// A search with its whole state.
 #[pyclass(module = "ambulo")]
-pub struct Genetic {
-    search: evolve::Genetic,
+pub struct Search {
+    search: arena::Evolution,
+}
+
+fn told<'py>(py: Python<'py>, told: arena::Told) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("best", told.best)?;
+    dict.set_item("mean", told.mean)?;
+    dict.set_item("steps", told.steps)?;
+    dict.set_item("crowned", told.crowned)?;
+    dict.set_item("restarted", told.restarted)?;
+    Ok(dict)
 }
 
 #[pymethods]
-impl Genetic {
-    /// From a stored state.
-    #[staticmethod]
-    fn restore(state: &str) -> PyResult<Self> {
-        let search: evolve::Genetic = serde_json::from_str(state).map_err(value_error)?;
-        search.check().map_err(value_error)?;
-        Ok(Self { search })
-    }
-
+impl Search {
     /// The whole state, as JSON text.
     fn state(&self) -> PyResult<String> {
         serde_json::to_string(&self.search).map_err(value_error)
@@ -263,17 +341,84 @@ impl Genetic {
         self.search.generation()
     }
 
-    /// (N, G): the genomes whose fitness it wants to know.
-    fn ask<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        let genomes = self.search.ask();
-        let columns = genomes.first().map_or(0, Vec::len);
-        let array = Array2::from_shape_vec((genomes.len(), columns), genomes.concat());
-        array.expect("genomes of one length").into_pyarray(py)
+    /// How often it began anew.
+    #[getter]
+    fn restarts(&self) -> u64 {
+        self.search.restarts()
     }
 
-    /// Takes a fitness for each; the next generation is made.
-    fn tell(&mut self, fitness: Vec<f64>) -> PyResult<()> {
-        self.search.tell(&fitness).map_err(value_error)
+    /// (N, G): the genomes whose fitness it wants to know; where they differ in length, shorter ones
+    /// are filled up with NaN.
+    fn ask<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        let genomes = self.search.ask();
+        let longest = genomes.iter().map(Vec::len).max().unwrap_or(0);
+        let row = |genome: &Vec<f32>| {
+            let mut row = genome.clone();
+            row.resize(longest, f32::NAN);
+            row
+        };
+        Recorded::rows(py, genomes.iter().flat_map(row).collect(), longest)
+    }
+
+    /// In episodes of how many steps.
+    fn steps(&self, arena: &Arena) -> u32 {
+        self.search.steps(&arena.arena)
+    }
+
+    /// Takes the scores of the genomes that it asked for, (N, 4) as `Arena.evaluate` gives them; the
+    /// next generation is made. Gives best, mean, steps, crowned, restarted.
+    fn tell<'py>(
+        &mut self,
+        py: Python<'py>,
+        arena: &Arena,
+        scores: PyReadonlyArray2<'py, f64>,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let rows = scores.as_array();
+        if rows.ncols() != 4 {
+            return Err(value_error("scores: 4 numbers each are expected"));
+        }
+        let score = |row: numpy::ndarray::ArrayView1<'_, f64>| arena::Score {
+            fitness: row[0],
+            alive: row[1],
+            behaviour: [row[2], row[3]],
+            terms: arena::Terms::new(),
+        };
+        let scores: Vec<_> = rows.rows().into_iter().map(score).collect();
+        let found = py.detach(|| self.search.tell(&arena.arena, &scores, threads));
+        told(py, found.map_err(value_error)?)
+    }
+
+    /// A generation: asked, evaluated on so many threads, told.
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        arena: &Arena,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let found = py.detach(|| self.search.step(&arena.arena, threads));
+        told(py, found.map_err(value_error)?)
+    }
+
+    /// Genome, fitness, generation, robustness (or None) and whether it is good; None before there is
+    /// one.
+    fn champion<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(champion) = self.search.champion() else { return Ok(None) };
+        let dict = PyDict::new(py);
+        dict.set_item("genome", champion.genome.clone().into_pyarray(py))?;
+        dict.set_item("fitness", champion.fitness)?;
+        dict.set_item("generation", champion.generation)?;
+        let found = champion.robustness.as_ref().map(|found| robustness(found).to_string());
+        dict.set_item("robustness", found)?;
+        dict.set_item("good", champion.good)?;
+        Ok(Some(dict))
+    }
+
+    /// Whether the champion is `usable`, `robust` or `good` (and robust).
+    fn has(&self, what: &str) -> PyResult<bool> {
+        let until: arena::Until =
+            serde_json::from_value(what.into()).map_err(|_| value_error(format!("no '{what}'")))?;
+        Ok(self.search.champion().is_some_and(|champion| champion.is(until)))
     }
 }
 
@@ -315,19 +460,19 @@ impl CreatureController {
 
     /// Its genome.
     fn genome<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f32>> {
-        self.pilot.network().genome().to_vec().into_pyarray(py)
+        self.pilot.genome().to_vec().into_pyarray(py)
     }
 
-    /// Widths of the network, inputs to outputs.
+    /// Widths of a plain network, inputs to outputs; nothing of other controllers.
     #[getter]
     fn widths(&self) -> Vec<usize> {
-        self.pilot.network().widths().to_vec()
+        self.pilot.network().map_or(vec![], |network| network.widths().to_vec())
     }
 
     /// Motor speeds, radians a second, of what is sensed (SI units; only what its sensors ask for
-    /// is used).
+    /// is used; all but plain networks need the joints' angles and the time since they began).
     #[pyo3(signature = (torso_rotation, joint_angles, joint_speeds=None, foot_contacts=None,
-        height=0.0, velocity=[0.0, 0.0], ground_rays=None))]
+        height=0.0, velocity=[0.0, 0.0], ground_rays=None, time=0.0))]
     #[allow(clippy::too_many_arguments)] // The senses, by name.
     fn drive<'py>(
         &mut self,
@@ -339,8 +484,10 @@ impl CreatureController {
         height: f32,
         velocity: [f32; 2],
         ground_rays: Option<Vec<f32>>,
+        time: f32,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
         self.senses = Senses {
+            time,
             torso_rotation,
             joint_angles,
             joint_speeds: joint_speeds.unwrap_or_default(),
@@ -364,6 +511,7 @@ pub fn creature_tasks(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         dict.set_item("name", task.name())?;
         dict.set_item("about", task.about())?;
         dict.set_item("steps", task.steps())?;
+        dict.set_item("controller", task.controller().name())?;
         let weights = task.weights().iter().map(|(term, weight)| (term.name(), *weight));
         dict.set_item("weights", weights.collect::<BTreeMap<_, _>>())?;
         Ok(dict)

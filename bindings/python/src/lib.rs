@@ -15,7 +15,7 @@ mod _core {
     #[pymodule_export]
     use crate::character::{Controller, Terrain, drawn_offsets};
     #[pymodule_export]
-    use crate::creature::{Arena, Creature, CreatureController, Genetic, Recorded, creature_tasks};
+    use crate::creature::{Arena, Creature, CreatureController, Recorded, Search, creature_tasks};
     #[pymodule_export]
     use crate::dataset::{
         clip_rows, dataset_build, dataset_categories, dataset_check, dataset_plan,

@@ -7,9 +7,12 @@
 //! The network is that of Holden, Komura and Saito, "Phase-Functioned Neural Networks for
 //! Character Control" (SIGGRAPH 2017): affine layers with ELU in between, whose weights are a
 //! closed Catmull-Rom spline through four control points, followed once a cycle. Beside it there is
-//! the plain fully connected network that evolution likes: [`Mlp`].
+//! the plain fully connected network that evolution likes, [`Mlp`], [`Graph`] for those whose
+//! shape evolves, and [`Genes`] to store those that are no network.
 
 mod bundle;
+mod genes;
+mod graph;
 mod kernel;
 mod mlp;
 mod network;
@@ -19,6 +22,8 @@ pub use bundle::{
     Bundle, BundleError, BundleOf, FORMAT_VERSION, Header, LayoutTable, Precision, Tensor, Tensors,
     Weights,
 };
-pub use mlp::{Activation, Mlp, MlpScratch};
+pub use genes::Genes;
+pub use graph::{Edge, Graph};
+pub use mlp::{Activation, Mlp, MlpScratch, predict_lanes};
 pub use network::{Layer, Network, NetworkError, Normalisation, Scratch};
 pub use phase::{CONTROL_POINTS, control_weights, spline_shares};

@@ -4,6 +4,7 @@
 //! Two Dimensions" (TU Wien, 2017), sections 3.1.2 and 4.2.2: a bias for every layer, the same
 //! activation after each, the output layer's included.
 
+use ambulo_lanes::{Lanes, Scalar, Simd, math};
 use serde::{Deserialize, Serialize};
 
 use crate::bundle::{BundleError, Tensor, Tensors, Weights, layer_names};
@@ -36,15 +37,24 @@ impl Activation {
         }
     }
 
-    /// Its value. From `libm`, so that it is the same on every machine.
+    /// Its value; the same bits on every machine.
     pub fn of(self, a: f32) -> f32 {
+        self.of_lanes(Lanes::<Scalar>::from(a)).value()
+    }
+
+    /// Its value in every lane.
+    #[inline(always)]
+    pub fn of_lanes<S: Simd>(self, a: Lanes<S>) -> Lanes<S> {
         match self {
-            Activation::Logistic => 1.0 / (1.0 + libm::expf(-a)),
-            Activation::Tanh => libm::tanhf(a),
+            Activation::Logistic => math::logistic(a),
+            Activation::Tanh => math::tanh(a),
             Activation::CheapTanh => {
-                // It reaches ±1 at ±3.
-                let a = a.clamp(-3.0, 3.0);
-                a * (27.0 + a * a) / (27.0 + 9.0 * a * a)
+                // It reaches ±1 at ±3; held this way around, what is not a number stays one.
+                let three = a.like(3.0);
+                let a = a.greater(three).choose(three, a);
+                let a = a.less(-three).choose(-three, a);
+                let square = a * a;
+                a * (square + 27.0) / (square * 9.0 + 27.0)
             }
         }
     }
@@ -158,12 +168,45 @@ impl Mlp {
                 }
             }
             for sum in to.iter_mut() {
-                *sum = self.gain * self.activation.of(*sum);
+                *sum = self.activation.of(*sum) * self.gain;
             }
             std::mem::swap(from, to);
             rest = after;
         }
         y.copy_from_slice(from);
+    }
+}
+
+/// One forward pass of as many networks of one shape as there are lanes: the same bits in each lane as
+/// [`Mlp::predict`] gives. `genes`: as [`Mlp::new`] takes them, a lane for each network; `values`: the
+/// inputs, and the outputs afterwards; `spare`: a buffer.
+///
+/// # Panics
+/// Numbers that do not fit `widths`.
+#[inline(always)]
+pub fn predict_lanes<S: Simd>(
+    widths: &[usize],
+    genes: &[Lanes<S>],
+    activation: Activation,
+    gain: f32,
+    values: &mut Vec<Lanes<S>>,
+    spare: &mut Vec<Lanes<S>>,
+) {
+    let mut rest = genes;
+    for pair in widths.windows(2) {
+        assert_eq!(values.len(), pair[0], "numbers in");
+        let (layer, after) = rest.split_at((pair[0] + 1) * pair[1]);
+        spare.clear();
+        // Plain loops: closures handed to the standard library are compiled for any machine.
+        for neuron in layer.chunks_exact(pair[0] + 1) {
+            let mut sum = neuron[pair[0]];
+            for (weight, input) in neuron.iter().zip(values.iter()) {
+                sum += *weight * *input;
+            }
+            spare.push(activation.of_lanes(sum) * gain);
+        }
+        std::mem::swap(values, spare);
+        rest = after;
     }
 }
 
@@ -301,6 +344,34 @@ mod tests {
             mlp.predict(&x, &mut y, &mut mlp.scratch());
             for (got, expected) in y.iter().zip(h) {
                 assert!((f64::from(*got) - expected).abs() < 1e-5, "{activation:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn lanes_give_the_same_bits() {
+        struct Pass<'a>(&'a Mlp, &'a [f32]);
+        impl ambulo_lanes::Job for Pass<'_> {
+            type Output = Vec<u32>;
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, simd: S) -> Vec<u32> {
+                let Self(mlp, x) = self;
+                let lanes = |values: &[f32]| -> Vec<_> {
+                    values.iter().map(|&v| Lanes::splat(simd, v)).collect()
+                };
+                let (genes, mut values) = (lanes(mlp.genome()), lanes(x));
+                let (activation, gain) = (mlp.activation(), mlp.gain());
+                predict_lanes(mlp.widths(), &genes, activation, gain, &mut values, &mut Vec::new()); // fmt: skip
+                values.iter().map(|value| value.lane(Lanes::<S>::WIDTH - 1).to_bits()).collect()
+            }
+        }
+        for activation in Activation::ALL {
+            let (mlp, x) = (mlp(activation), numbers(9, 2));
+            let mut y = vec![0.0; 8];
+            mlp.predict(&x, &mut y, &mut mlp.scratch());
+            let expected: Vec<u32> = y.iter().map(|value| value.to_bits()).collect();
+            for width in ambulo_lanes::Width::available() {
+                assert_eq!(width.run(Pass(&mlp, &x)), expected, "{activation:?} {width:?}");
             }
         }
     }

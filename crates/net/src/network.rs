@@ -11,6 +11,8 @@ pub(crate) const MAX_WIDTH: usize = 1 << 16;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum NetworkError {
+    #[error("no graph of connections: {0}")]
+    Graph(String),
     #[error("a network needs at least one layer")]
     Empty,
     #[error("'{tensor}': expected {expected} numbers, got {got}")]

@@ -56,8 +56,9 @@ def evolve(
 ) -> None:
     """Character-steps a second of the physics with the seed's network every step.
 
-    All engines take turns on the same creature, so that a machine that slows down slows all;
-    medians are printed.
+    Engines: the lockstep solver with as many lanes as this machine has, and with 8 and 1; Box2D,
+    and pyb2d3, which is another binding of it. All take turns on the same creature, so that a
+    machine that slows down slows all; medians are printed, and lockstep over each of the others.
 
     \b
     Example:
@@ -65,9 +66,8 @@ def evolve(
     """
     bodies = {name: load_creature(name) for name in creatures}
     threads = list(dict.fromkeys(counts or (1, default_threads())))
-    total = len(bodies) * (len(threads) + peers) * (repeats + 1)
     try:
-        with bar("measuring", total, "runs") as progress:
+        with bar("measuring", 1.0, "") as progress:
             found = compare(
                 bodies, population=population, steps=steps, repeats=repeats, threads=threads,
                 peers=peers, watch=progress,
@@ -87,7 +87,8 @@ def evolve(
     console.print(table)
     for row in found["ratios"]:
         console.print(
-            f"{row['ratio']:.2f} × {row['over']} on {row['creature']}, threads: {row['threads']}"
+            f"lockstep is {row['ratio']:.2f} × {row['over']} on {row['creature']}, "
+            f"threads: {row['threads']}"
         )
     about = found["machine"]
     console.print(f"{about['cpu']}, {about['cores']} processors, load {about['load']}")

@@ -18,13 +18,16 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from ambulo._core import Arena, Creature, creature_tasks
 from ambulo.cli.stopping import STOPPED, held_back
 from ambulo.creature import load_creature
-from ambulo.evolution import Evolution, Generation
+from ambulo.evolution import Champion, Evolution, Generation
 from ambulo.executors import Executor, check_ray, on_ray, on_threads
 
 if TYPE_CHECKING:
     from ambulo._core import CreatureFacts
 
 TASKS = [task["name"] for task in creature_tasks()]
+UNTIL = ["usable", "robust", "good"]
+KINDS = ["network", "phase_network", "oscillator", "oscillator_network", "poses", "graph"]
+STRATEGIES = ["genetic", "es", "cma_es", "openai_es", "map_elites", "neat"]
 
 
 @click.command()
@@ -36,10 +39,30 @@ TASKS = [task["name"] for task in creature_tasks()]
 )  # fmt: skip
 @click.option(
     "--config", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="TOML file with settings; what it leaves out is as the seed has it.",
+    help="TOML file with settings; what it leaves out is as the preset has it. --dry-run prints "
+    "all there are.",
 )  # fmt: skip
-@click.option("--generations", type=click.IntRange(1), help="How many. Default: 300.")
-@click.option("--population", type=click.IntRange(3), help="Genomes of each. Default: 50.")
+@click.option(
+    "--preset", type=click.Choice(["natural", "seed"]),
+    help="natural (default): a gait in seconds, chosen for holding up. seed: the protocol of 2017.",
+)  # fmt: skip
+@click.option(
+    "--until", type=click.Choice(UNTIL),
+    help="Stop as soon as the champion is usable; or still so under other physics; or good, too.",
+)  # fmt: skip
+@click.option(
+    "--solver", type=click.Choice(["lockstep", "box2d"]), help="Who does the physics. "
+    "Default: lockstep, which is some twenty times faster.",
+)  # fmt: skip
+@click.option("--controller", type=click.Choice(KINDS), help="Default: what suits the task.")
+@click.option(
+    "--strategy", type=click.Choice(STRATEGIES),
+    help="Default: es, an evolution strategy; in the seed's protocol genetic.",
+)  # fmt: skip
+@click.option("--generations", type=click.IntRange(1), help="At most so many. Default: 300.")
+@click.option(
+    "--population", type=click.IntRange(2), help="Genomes of each. Default: the strategy's own."
+)
 @click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Of everything random. Default: 1.")
 @click.option(
     "--minutes", type=click.FloatRange(0.0, min_open=True),
@@ -62,6 +85,11 @@ def evolve(
     task: str | None,
     folder: Path,
     config: Path | None,
+    preset: str | None,
+    until: str | None,
+    solver: str | None,
+    controller: str | None,
+    strategy: str | None,
     generations: int | None,
     population: int | None,
     seed: int | None,
@@ -74,7 +102,10 @@ def evolve(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    """Evolve how CREATURE does TASK: a file or the name of one that ships; run or jump.
+    """Evolve how CREATURE, a file or the name of one that ships, does TASK.
+
+    A champion is chosen on replays: usable as it is, then under how many other physics (friction,
+    mass, pushes), then good. A search that is stuck begins anew.
 
     RUN gets the settings, a line a generation, a controller for every improvement and a
     checkpoint. Ctrl-C finishes the generation and saves; --resume goes on, also after a crash, to
@@ -82,23 +113,35 @@ def evolve(
 
     \b
     Examples:
-      ambulo evolve tetrapod2 run -o out/tetrapod
+      ambulo evolve tetrapod2 run -o out/tetrapod --until good
+      ambulo evolve biped2 run -o out/seed --preset seed --solver box2d
       ambulo evolve my_creature.json jump -o out/mine --seed 7 --minutes 2
       ambulo evolve --resume -o out/tetrapod --generations 600
     """
     if ray_address is not None and executor != "ray":
         raise click.UsageError("--ray-address belongs to --executor ray")
+    chosen = {
+        "preset": preset,
+        "generations": generations,
+        "seed": seed,
+        "world.solver": solver,
+        "controller.kind": controller,
+        "evolution.strategy": strategy,
+        "evolution.population": population,
+    }
     if resume:
-        run = _resumed(folder, creature, task, config, population, seed, overwrite, generations)
+        run = _resumed(folder, creature, task, config, chosen, overwrite)
         if dry_run:
             _say_plan(run.arena, run.creature.facts(), as_json)
             return
+        _check_until(run.arena, until)
     else:
         if creature is None or task is None:
             raise click.UsageError("CREATURE and TASK are needed, unless --resume goes on with RUN")
         body = load_creature(creature)
-        asked = _settings(config, task, generations, population, seed)
+        asked = _settings(config, task, chosen)
         arena = _arena(body, asked, config)
+        _check_until(arena, until)
         if dry_run:
             _say_plan(arena, body.facts(), as_json)
             return
@@ -115,19 +158,19 @@ def evolve(
         held_back() as asked_to_stop,
         _showing(run, minutes) as show,
     ):
-        for done in run.steps(tried, minutes=minutes, stop=asked_to_stop):
+        for done in run.steps(
+            tried, threads=threads, minutes=minutes, until=until, stop=asked_to_stop
+        ):
             show(done)
-        stopped = asked_to_stop() and run.generation < run.generations
-    _report(run, began, as_json)
+        reached = None if until is None else run.search.has(until)
+        stopped = asked_to_stop() and run.generation < run.generations and not reached
+    _report(run, began, until, reached, as_json)
     if stopped:
         click.echo(f"stopped after generation {run.generation}; --resume goes on", err=True)
         raise click.exceptions.Exit(STOPPED)
 
 
-def _settings(
-    config: Path | None, task: str, generations: int | None, population: int | None,
-    seed: int | None,
-) -> dict[str, Any]:  # fmt: skip
+def _settings(config: Path | None, task: str, chosen: dict[str, Any]) -> dict[str, Any]:
     """The configuration file with what the command line says on top."""
     settings: dict[str, Any] = {}
     if config is not None:
@@ -141,14 +184,16 @@ def _settings(
         raise ValueError(f"{config}: task: expected a table")
     if wanted.setdefault("name", task) != task:
         raise ValueError(f"{config}: task.name is '{wanted['name']}', but '{task}' is asked for")
-    for key, value in (("generations", generations), ("seed", seed)):
-        if value is not None:
-            settings[key] = value
-    if population is not None:
-        strategy = settings.setdefault("evolution", {})
-        if not isinstance(strategy, dict):
-            raise ValueError(f"{config}: evolution: expected a table")
-        strategy["population"] = population
+    for place, value in chosen.items():
+        if value is None:
+            continue
+        *tables, key = place.split(".")
+        table = settings
+        for name in tables:
+            table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise ValueError(f"{config}: {name}: expected a table")
+        table[key] = value
     return settings
 
 
@@ -158,6 +203,13 @@ def _arena(body: Creature, settings: dict[str, Any], config: Path | None) -> Are
         return Arena(body, json.dumps(settings))
     except ValueError as error:
         raise ValueError(str(error) if config is None else f"{config}: {error}") from error
+
+
+def _check_until(arena: Arena, until: str | None) -> None:
+    if until is not None and json.loads(arena.settings())["search"]["trials"] == 0:
+        raise click.UsageError(
+            f"--until {until} needs champions that are chosen on replays, but search.trials is 0"
+        )
 
 
 def _check_values(value: Any, config: str, place: str) -> None:
@@ -176,13 +228,14 @@ def _check_values(value: Any, config: str, place: str) -> None:
 
 def _resumed(
     folder: Path, creature: str | None, task: str | None, config: Path | None,
-    population: int | None, seed: int | None, overwrite: bool, generations: int | None,
+    chosen: dict[str, Any], overwrite: bool,
 ) -> Evolution:  # fmt: skip
     if overwrite:
         raise click.UsageError("--resume goes on, --overwrite starts again: give one of them")
-    if config is not None or population is not None or seed is not None:
+    others = [value for place, value in chosen.items() if place != "generations"]
+    if config is not None or any(value is not None for value in others):
         raise click.UsageError("a run goes on with the settings that it began with")
-    run = Evolution.resume(folder, generations)
+    run = Evolution.resume(folder, chosen["generations"])
     if task is not None and run.settings["task"]["name"] != task:
         raise click.ClickException(f"{folder} is a run of {run.settings['task']['name']}")
     if creature is not None and load_creature(creature).hash != run.creature.hash:
@@ -199,9 +252,9 @@ def _say_plan(arena: Arena, facts: CreatureFacts, as_json: bool) -> None:
         driven, legs = len(facts["driven"]), len(facts["legs"])
         click.echo(f"{facts['name']}: {driven} driven joints, {legs} legs, {facts['mass']:.1f} kg")
         click.echo(
-            f"{settings['task']['name']}: {settings['generations']} generations of "
-            f"{settings['evolution']['population']}, {arena.steps} steps each, "
-            f"{arena.genes} weights"
+            f"{settings['task']['name']}: at most {settings['generations']} generations of "
+            f"{len(arena.search().ask())}, {' then '.join(map(str, arena.stages))} steps each, "
+            f"{arena.genes} genes, {settings['evolution']['strategy']}"
         )
         click.echo(json.dumps(settings, indent=2))
     click.echo("dry run: nothing written", err=True)
@@ -266,28 +319,50 @@ def _told(run: Evolution, done: Generation) -> str:
     return f"generation {done.generation}/{run.generations}  best {best}  mean {mean}"
 
 
-def _report(run: Evolution, began: int, as_json: bool) -> None:
-    best = run.best_genome is not None
+def _verdict(champion: Champion) -> str | None:
+    """What its replays say of it, in a word."""
+    if champion.robustness is None:
+        return None
+    if champion.robustness["robust"]:
+        return "good and robust" if champion.good else "robust"
+    return "usable" if champion.robustness["usable"] else "not usable"
+
+
+def _report(
+    run: Evolution, began: int, until: str | None, reached: bool | None, as_json: bool
+) -> None:
+    best = run.champion
     report = {
         "run": str(run.folder),
         "creature": run.creature.facts()["name"],
         "task": run.settings["task"]["name"],
         "seed": run.settings["seed"],
         "generations": run.generation,
+        "restarts": run.search.restarts,
         "resumed_from": began or None,
-        "fitness": run.best_fitness if best else None,
-        "champion_generation": run.best_generation if best else None,
+        "fitness": best and best.fitness,
+        "champion_generation": best and best.generation,
         "champion": str(run.folder / "best.safetensors") if best else None,
+        "robustness": best and best.robustness,
+        "good": None if best is None or best.robustness is None else best.good,
+        "reached": reached,
         "seconds": round(run.seconds, 3),
     }
     if as_json:
         click.echo(json.dumps(report, indent=2))
         return
-    if not best:
+    if best is None:
         click.echo(f"{run.generation} generations, but nothing that is a number came of any")
         return
+    verdict = _verdict(best)
     click.echo(
-        f"{report['creature']}, {report['task']}: fitness {run.best_fitness:.3f} in generation "
-        f"{run.best_generation} of {run.generation}, {run.seconds:.1f} s"
+        f"{report['creature']}, {report['task']}: {'' if verdict is None else f'{verdict}, '}"
+        f"fitness {best.fitness:.3f} in generation {best.generation} of {run.generation}, "
+        f"{run.seconds:.1f} s"
     )
+    if until is not None:
+        click.echo(
+            f"{'' if reached else 'not yet '}{until} after {run.generation} of at most "
+            f"{run.generations} generations"
+        )
     click.echo(f"watch it: ambulo replay {run.folder} -o {run.folder / 'replay'}")

@@ -48,6 +48,10 @@ STEPS = 2000
     "--task", type=click.Choice(TASKS), help="Judge it as this. Default: what it was evolved for."
 )
 @click.option(
+    "--solver", type=click.Choice(["lockstep", "box2d"]),
+    help="Play it in another solver than the one it was evolved in, and say how far it gets there.",
+)  # fmt: skip
+@click.option(
     "--film", default="gif", show_default=True, type=click.Choice(["gif", "mp4", "none"]),
     help="MP4 needs ffmpeg.",
 )  # fmt: skip
@@ -66,6 +70,7 @@ def replay(
     steps: int,
     creature: str | None,
     task: str | None,
+    solver: str | None,
     film: str,
     seconds: float,
     population: bool,
@@ -80,6 +85,7 @@ def replay(
     Examples:
       ambulo replay out/tetrapod -o out/tetrapod/replay
       ambulo replay out/tetrapod -o look --population --film none
+      ambulo replay out/tetrapod -o box2d --solver box2d
       ambulo replay out/tetrapod/best.safetensors -o look --creature heavier.json --film none --json
     """
     if population and not source.is_dir():
@@ -88,15 +94,24 @@ def replay(
     body = saved.creature if creature is None else load_creature(creature)
     settings = dict(saved.settings)
     settings["task"] = _task(saved, task)
+    evolved_in = _arena(body, settings, saved)
+    settings["world"] = {**settings.get("world", {}), **({"solver": solver} if solver else {})}
     arena = _arena(body, settings, saved)
-    fitness = _fitness(arena, saved, body)
+    elsewhere = evolved_in.settings() != arena.settings()
+    fitness = _fitness(arena, saved, body, elsewhere)
     rollout, judgement = recorded(arena, body, saved.genome, steps)
+    if elsewhere:
+        _, at_home = recorded(evolved_in, body, saved.genome, steps)
+        fitness["distance_at_home"] = at_home["distance"]
+    robustness = json.loads(arena.robustness(saved.genome[None], default_threads()))[0]
     report = {
         "creature": body.facts()["name"],
         "task": settings["task"]["name"],
         "same_creature": body.hash == saved.creature.hash,
+        "solver": json.loads(arena.settings())["world"]["solver"],
         **fitness,
         **judgement,
+        "robustness": robustness,
     }
     output.mkdir(parents=True, exist_ok=True)
     files = _pictures(output, rollout, report, film, seconds)
@@ -124,24 +139,31 @@ def _task(saved: SavedController, task: str | None) -> dict[str, Any]:
 
 def _arena(body: Creature, settings: dict[str, Any], saved: SavedController) -> Arena:
     arena = Arena(body, json.dumps(settings))
-    if arena.genes != len(saved.genome):
+    grows = json.loads(arena.settings())["controller"]["kind"] == "graph"
+    if arena.genes != len(saved.genome) and not grows:
         raise click.ClickException(
-            f"{body.facts()['name']} needs a network of {arena.genes} weights, this controller has "
+            f"{body.facts()['name']} needs a controller of {arena.genes} numbers, this one has "
             f"{len(saved.genome)}: joints and sensors must be as many as "
             f"{saved.creature.facts()['name']} has"
         )
     return arena
 
 
-def _fitness(arena: Arena, saved: SavedController, body: Creature) -> dict[str, Any]:
-    """Fitness of the episode that was evolved, beside what was noted then."""
+def _fitness(
+    arena: Arena, saved: SavedController, body: Creature, elsewhere: bool
+) -> dict[str, Any]:
+    """Fitness of the episode that was evolved, beside what was noted then.
+
+    `elsewhere`: the arena is not the one that it was evolved in.
+    """
     fitness, terms = arena.score(saved.genome)
     noted = saved.record.get("fitness_hex")
     before = None if noted is None else float.fromhex(noted)
     evolved = (
         saved.settings.get("task", {}).get("name") == json.loads(arena.settings())["task"]["name"]
     )
-    if before is not None and body.hash == saved.creature.hash and evolved and fitness != before:
+    same = body.hash == saved.creature.hash and evolved and not elsewhere
+    if before is not None and same and fitness != before:
         raise RuntimeError(
             f"the replay reached {fitness!r}, but {before!r} is noted: the file was changed, or "
             "this machine computes differently"
@@ -182,14 +204,17 @@ def _population(path: Path, run: Path, saved: SavedController) -> Path:
     poses = np.stack([recording.poses()[-1] for recording in recordings])
     title = f"{saved.creature.facts()['name']}, generation {generation}"
     return write_training_picture(
-        path, description(saved.creature), poses, arena.evaluate(genomes, default_threads()),
+        path, description(saved.creature), poses, arena.evaluate(genomes, default_threads())[:, 0],
         recordings[0].ground(), title,
     )  # fmt: skip
 
 
 def _say(report: dict[str, Any], output: Path) -> None:
     shown = f"{report['creature']}, {report['task']}: "
-    click.echo(shown + ("usable" if report["usable"] else "not usable"))
+    verdict = "usable" if report["usable"] else "not usable"
+    if report["usable"] and report["robustness"]["robust"]:
+        verdict = "good and robust" if report["good"] else "robust"
+    click.echo(shown + verdict)
     for reason in report["reasons"]:
         click.echo(f"  {reason}")
     click.echo(f"fitness {report['fitness']:.3f}", nl=False)
@@ -209,6 +234,18 @@ def _say(report: dict[str, Any], output: Path) -> None:
     for name, (value, unit) in figures.items():
         if value is not None:
             click.echo(f"  {name:>17}  {value:.2f} {unit}".rstrip())
+    held = report["robustness"]
+    click.echo(
+        f"  {'other physics':>17}  friction {sum(held['friction'])} of 2, "
+        f"mass {sum(held['mass'])} of 2, pushes {held['pushes']} of 16"
+    )
+    # How far a jump drifts is nobody's aim.
+    if report["gain"] is None and report.get("distance_at_home", 0.0) > 0.1:
+        kept = 100.0 * report["distance"] / report["distance_at_home"]
+        click.echo(
+            f"  {'distance':>17}  {report['distance']:.1f} m in {report['solver']}, "
+            f"{kept:.0f} % of where it was evolved"
+        )
     if report["legs"]:
         click.echo(f"  {'legs used':>17}  {report['legs_used']} of {report['legs']}")
     click.echo(f"wrote {', '.join(Path(file).name for file in report['files'])} to {output}")

@@ -11,12 +11,12 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ambulo._core import creature_tasks
 from ambulo.cli.stopping import STOPPED, held_back
-from ambulo.study.published import GENERATIONS, PUBLISHED
+from ambulo.study import gaits as how_soon
+from ambulo.study.published import GENERATIONS, JUMP, PUBLISHED, RUN
 from ambulo.study.seed_2d import Plan, begun, evolve_all, gather, publish, seed_creatures
 
-TASKS = [task["name"] for task in creature_tasks()]
+TASKS = [RUN, JUMP]
 
 
 @click.group()
@@ -109,6 +109,55 @@ def seed_2d(
         click.echo(f"wrote {page}")
     if not finished:
         click.echo("stopped; the same command goes on", err=True)
+        raise click.exceptions.Exit(STOPPED)
+
+
+@study.command()
+@click.option(
+    "-o", "--output", required=True, metavar="DIR",
+    type=click.Path(file_okay=False, path_type=Path), help="Folder for results and page.",
+)  # fmt: skip
+@click.option(
+    "--creature", "creatures", multiple=True, metavar="CREATURE",
+    help="A file or the name of one that ships; may be given again. Default: the seed's seven.",
+)  # fmt: skip
+@click.option(
+    "--seeds", default=3, show_default=True, type=click.IntRange(1, 1000), help="1 to this."
+)
+@click.option(
+    "--seconds", default=5.0, show_default=True, type=click.FloatRange(0.0, 3600.0, min_open=True),
+    help="Of the processor's time that each search gets.",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print the totals as JSON.")
+def gaits(
+    output: Path, creatures: tuple[str, ...], seeds: int, seconds: float, as_json: bool
+) -> None:
+    """How soon creatures run and jump: usable, robust, good; the seed's minutes beside it.
+
+    Every creature and task with default settings on one thread, and running with the seed's
+    network; champions are played in Box2D, too. Ctrl-C stops and writes what there is.
+
+    \b
+    Examples:
+      ambulo study gaits -o out/gaits
+      ambulo study gaits -o out/mine --creature my_creature.json --seeds 1
+    """
+    names = creatures or seed_creatures()
+    with held_back() as asked_to_stop, _bar(len(how_soon.ROWS) * len(names) * seeds) as watch:
+        results = how_soon.study(
+            names, seeds=seeds, seconds=seconds, stop=asked_to_stop, watch=watch
+        )
+        stopped = asked_to_stop()
+    if not results["cases"]:
+        raise click.exceptions.Exit(STOPPED)
+    written = how_soon.write(output, results)
+    if as_json:
+        click.echo(json.dumps(results["totals"], indent=2))
+    else:
+        click.echo(how_soon.page(results).split("## ")[0].strip())
+        click.echo(f"wrote {' and '.join(map(str, written))}")
+    if stopped:
+        click.echo("stopped: some cases are missing", err=True)
         raise click.exceptions.Exit(STOPPED)
 
 

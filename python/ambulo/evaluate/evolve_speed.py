@@ -1,7 +1,8 @@
-"""How fast creatures are tried, beside what others make of the same engine."""
+"""How fast creatures are tried: by our solver, by Box2D, and by what others make of that."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import statistics
 import time
@@ -14,6 +15,9 @@ from ambulo.evaluate.machine import machine
 from ambulo.evaluate.peer_pyb2d3 import Peer
 
 Measured = Callable[[], float]
+OURS, PEER = "lockstep", "pyb2d3"
+LANES = {8: "8 lanes", 1: "1 lane"}
+"""Widths that are measured beside the one that this machine takes: AVX2's, and any machine's."""
 
 
 def engines(
@@ -22,17 +26,21 @@ def engines(
     """What is measured, by engine and threads: each call gives character-steps a second.
 
     All drive the same creature with the seed's network, inputs | 10 | outputs, every step: random
-    ones, as at the start of a search.
+    ones, as at the start of a search. `lockstep` steps as many individuals together as this machine
+    can, `lockstep, 1 lane` each by itself.
 
     Raises:
         ImportError: a peer is asked for and not installed; the message says how to.
     """
-    settings = {"seed": seed, "task": {"name": "run", "steps": steps}}
-    settings["evolution"] = {"population": population}
-    arena = Arena(creature, json.dumps(settings))
-    genomes = arena.search().ask()
 
-    def ours(count: int) -> Measured:
+    def ours(solver: str, lanes: int | None) -> Arena:
+        settings = {"preset": "seed", "seed": seed, "task": {"name": "run", "steps": steps}}
+        settings |= {"evolution": {"population": population}, "world": {"solver": solver}}
+        return Arena(creature, json.dumps(settings), lanes)
+
+    def measured(arena: Arena, count: int) -> Measured:
+        genomes = arena.search().ask()
+
         def measure() -> float:
             began = time.perf_counter()
             arena.evaluate(genomes, count)
@@ -40,7 +48,17 @@ def engines(
 
         return measure
 
-    found = {("box2d", count): ours(count) for count in threads}
+    arenas = {OURS: ours("lockstep", None)}
+    for lanes, name in LANES.items():
+        # Not every machine has them.
+        with contextlib.suppress(ValueError):
+            arenas[f"lockstep, {name}"] = ours("lockstep", lanes)
+    arenas["box2d"] = ours("box2d", None)
+    found = {
+        (engine, count): measured(arena, count)
+        for engine, arena in arenas.items()
+        for count in threads
+    }
     if peers:
         body = description(creature)
         Peer(body, population, seed)  # What is missing shows before anything is measured.
@@ -51,7 +69,7 @@ def engines(
             Peer(body, population, seed).run(steps)
             return population * steps / (time.perf_counter() - began)
 
-        found["pyb2d3", 1] = peer
+        found[PEER, 1] = peer
     return found
 
 
@@ -64,9 +82,12 @@ def compare(
     threads: list[int],
     peers: bool = True,
     seed: int = 1,
-    watch: Callable[[int], Any] = lambda done: None,
+    watch: Callable[[float], Any] = lambda share: None,
 ) -> dict[str, Any]:
-    """Interleaved repeats of every engine on every creature; medians, and the spread of each."""
+    """Interleaved repeats of every engine on every creature; medians, and the spread of each.
+
+    `watch` is told which share of them is done.
+    """
     plan: list[tuple[str, str, int, Measured]] = []
     for name, creature in creatures.items():
         made = engines(
@@ -81,7 +102,7 @@ def compare(
             if repeat:  # The first one warms up.
                 entry.append(speed)
             done += 1
-            watch(done)
+            watch(done / (len(plan) * (repeats + 1)))
     results = [
         {
             "engine": engine,
@@ -104,11 +125,15 @@ def compare(
 
 
 def _ratios(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Ours over each peer's, on the same creature: a thread, and with all that were asked for."""
+    """Ours over each other engine on the same creature and as many threads.
+
+    Over the peer, which has but one, with one and with all that were asked for.
+    """
     rows = []
-    for peer in (row for row in results if row["engine"] != "box2d"):
-        for own in results:
-            if own["engine"] == "box2d" and own["creature"] == peer["creature"]:
+    for peer in (row for row in results if row["engine"] != OURS):
+        for own in (row for row in results if row["engine"] == OURS):
+            alike = own["threads"] == peer["threads"] or peer["engine"] == PEER
+            if alike and own["creature"] == peer["creature"]:
                 ratio = own["char_steps_per_s"] / peer["char_steps_per_s"]
                 rows.append(
                     {

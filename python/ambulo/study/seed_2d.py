@@ -52,8 +52,9 @@ class Plan:
         return [(creature, task) for task in self.tasks for creature in self.creatures]
 
     def settings(self, task: str, seed: int) -> dict[str, Any]:
-        """The seed's own settings, which are the defaults, with what the plan says."""
+        """The seed's own settings with what the plan says."""
         return {
+            "preset": "seed",
             "generations": self.generations,
             "seed": seed,
             "evolution": {"population": self.population},
@@ -135,7 +136,7 @@ def gather(plan: Plan) -> dict[str, Any]:
         "runs": plan.runs,
         "generations": plan.generations,
         "population": plan.population,
-        "seconds": round(sum(run["seconds"] for run in runs), 1),
+        "seconds": round(sum(run["seconds"] for run in runs), 3),
         "settings": {"judged_steps": JUDGED_STEPS, **_common_settings(plan)},
         "cases": cases,
     }

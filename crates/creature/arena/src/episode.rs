@@ -1,162 +1,244 @@
-//! Individuals in a world, step by step: the one loop that training and recording share.
+//! Individuals in a world, step by step: the one loop that training, judging and recording share.
 
 use ambulo_body::{Body, Sensor};
-use ambulo_pilot::{Pilot, PilotScratch, Senses};
-use ambulo_world::{World, WorldError};
+use ambulo_evolve::Random;
+use ambulo_lanes::{Lanes, Mask, Simd};
+use ambulo_pilot::{Felt, Pilots};
+use ambulo_world::{Stage, WorldError};
 
-/// What there is to see of an individual after a step.
-pub(crate) struct Moment<'a> {
-    /// Seconds a step.
-    pub dt: f32,
-    /// Centre of the torso, metres.
-    pub torso: [f32; 2],
-    pub senses: &'a Senses,
-    /// What the motors were told, −1 to 1.
-    pub commands: &'a [f32],
-    /// What they gave, newton metres; empty if not asked for.
-    pub torques: &'a [f32],
+use crate::meter::{Look, Meter};
+use crate::settings::JUDGED;
+
+/// From one push to the next, seconds, and how fast it would make the whole creature, metres a
+/// second.
+const PUSH_EVERY: f32 = 2.0;
+const PUSH: f32 = 0.3;
+
+/// How an episode goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Plan {
+    pub steps: u32,
+    /// Whether a fall ends it.
+    pub falls: bool,
+    /// Whether torques are read, which costs time in Box2D, and whether angles are kept.
+    pub torques: bool,
+    pub series: bool,
 }
 
-/// One individual on its way.
-pub(crate) struct Walker {
-    pilot: Pilot,
-    scratch: PilotScratch,
-    senses: Senses,
-    commands: Vec<f32>,
-    torques: Vec<f32>,
-    torso: [f32; 2],
-    /// Its network gave something that is not a number: it does nothing any more.
-    pub lost: bool,
+impl Plan {
+    /// Of replays that are judged: no fall ends one.
+    pub const JUDGED: Plan = Plan { steps: JUDGED, falls: false, torques: true, series: false };
 }
 
-impl Walker {
-    pub fn new(pilot: Pilot, body: &Body) -> Self {
+/// A group of individuals on its way.
+pub(crate) struct Crew<S: Simd> {
+    pilots: Pilots<S>,
+    pub felt: Felt<S>,
+    pub touching: Vec<Mask<S>>,
+    pub torques: Vec<Lanes<S>>,
+    pub torso: [Lanes<S>; 2],
+    /// What a push changes, metres a second, and who draws its sign in each lane.
+    push: Lanes<S>,
+    pushers: Vec<Option<Random>>,
+    pub meter: Meter<S>,
+    /// Where a controller gave something that is not a number.
+    pub lost: Mask<S>,
+    done: bool,
+}
+
+impl<S: Simd> Crew<S> {
+    /// `seeds`: of the pushes in each lane.
+    pub fn new(
+        simd: S,
+        world: &impl Stage<S>,
+        group: usize,
+        bodies: &[&Body],
+        pilots: Pilots<S>,
+        seeds: &[Option<u64>],
+        plan: Plan,
+    ) -> Self {
+        let (body, zero) = (bodies[0], Lanes::zero(simd));
         let (joints, legs) = (body.driven().len(), body.legs().len());
-        let rays = pilot.sensors().iter().map(|sensor| match sensor {
-            Sensor::GroundRays { count, .. } => *count as usize,
-            _ => 0,
-        });
-        let senses = Senses {
-            joint_angles: vec![0.0; joints],
-            joint_speeds: vec![0.0; joints],
-            foot_contacts: vec![false; legs],
-            ground_rays: vec![0.0; rays.sum()],
-            ..Senses::default()
+        let felt = Felt::nothing(simd, joints, legs, pilots.sensors());
+        let never = Mask::never(simd);
+        let torso = world.centre(group, body.torso());
+        let touching: Vec<_> = (0..body.parts().len()).map(|p| world.touches(group, p)).collect();
+        let share = |lane: usize| {
+            let body = bodies[lane.min(bodies.len() - 1)];
+            PUSH * body.mass() / body.part_mass(body.torso())
         };
+        let dt = world.dt();
         Self {
-            scratch: pilot.scratch(),
-            senses,
-            commands: vec![0.0; joints],
-            torques: Vec::new(),
-            torso: [0.0; 2],
-            lost: false,
-            pilot,
+            meter: Meter::new(body, dt, torso, &touching, plan.steps, plan.falls, plan.series),
+            felt,
+            touching,
+            torques: vec![zero; if plan.torques { joints } else { 0 }],
+            torso,
+            push: Lanes::from_fn(simd, share),
+            pushers: seeds.iter().map(|seed| seed.map(Random::new)).collect(),
+            lost: never,
+            done: false,
+            pilots,
         }
     }
 
+    /// What the motors were told.
+    pub fn commands(&self) -> &[Lanes<S>] {
+        self.pilots.commands()
+    }
+
     /// Looks at where it is; `moved` says that a step lies behind, so that there are speeds.
-    fn sense(&mut self, world: &World, individual: usize, body: &Body, moved: bool) {
-        let rate = if moved { 1.0 / world.dt() } else { 0.0 };
-        let torso = world.centre(individual, body.torso());
-        let senses = &mut self.senses;
-        senses.torso_rotation = world.turned(individual, body.torso());
-        for (index, &joint) in body.driven().iter().enumerate() {
-            let angle = world.joint_angle(individual, joint);
-            let turned = crate::measures::wrap(angle - senses.joint_angles[index]);
-            senses.joint_speeds[index] = turned * rate;
-            senses.joint_angles[index] = angle;
+    #[inline(always)]
+    fn sense(&mut self, world: &impl Stage<S>, group: usize, body: &Body, moved: bool) {
+        let dt = world.dt();
+        let zero = dt.like(0.0);
+        let rate = if moved { dt.like(1.0) / dt } else { zero };
+        let torso = world.centre(group, body.torso());
+        self.felt.torso_rotation = world.turned(group, body.torso());
+        for index in 0..body.driven().len() {
+            let angle = world.joint_angle(group, body.driven()[index]);
+            let turned = ambulo_lanes::math::wrap(angle - self.felt.joint_angles[index]);
+            self.felt.joint_speeds[index] = turned * rate;
+            self.felt.joint_angles[index] = angle;
         }
-        for (on, leg) in senses.foot_contacts.iter_mut().zip(body.legs()) {
-            *on = world.touches(individual, leg.foot);
+        for part in 0..self.touching.len() {
+            self.touching[part] = world.touches(group, part);
         }
-        senses.velocity = [0, 1].map(|axis| (torso[axis] - self.torso[axis]) * rate);
-        for sensor in self.pilot.sensors() {
+        for leg in 0..body.legs().len() {
+            self.felt.foot_contacts[leg] = self.touching[body.legs()[leg].foot].one();
+        }
+        let [x, y] = self.torso;
+        self.felt.velocity = [(torso[0] - x) * rate, (torso[1] - y) * rate];
+        self.torso = torso;
+        if !self.pilots.sensors().is_empty() {
+            self.look_around(world);
+        }
+    }
+
+    /// Heights of the ground, for those who feel them.
+    fn look_around(&mut self, world: &impl Stage<S>) {
+        let [x, y] = self.torso;
+        let ground = |at: Lanes<S>| {
+            let mut heights = [0.0; 16];
+            at.store(&mut heights);
+            heights.iter_mut().for_each(|value| *value = world.ground().height(*value));
+            x.load_like(&heights)
+        };
+        for sensor in self.pilots.sensors() {
             match *sensor {
-                Sensor::Height => senses.height = torso[1] - world.ground().height(torso[0]),
+                Sensor::Height => self.felt.height = y - ground(x),
                 Sensor::GroundRays { count, reach } => {
-                    let here = world.ground().height(torso[0]);
-                    for (ray, height) in senses.ground_rays.iter_mut().enumerate() {
+                    let here = ground(x);
+                    for (ray, height) in self.felt.ground_rays.iter_mut().enumerate() {
                         let ahead = reach * (ray + 1) as f32 / count as f32;
-                        *height = world.ground().height(torso[0] + ahead) - here;
+                        *height = ground(x + ahead) - here;
                     }
                 }
                 _ => {}
             }
         }
-        self.torso = torso;
     }
 
-    fn steer(
+    #[inline(always)]
+    fn steer<W: Stage<S>>(
         &mut self,
-        world: &mut World,
-        individual: usize,
+        world: &mut W,
+        group: usize,
         body: &Body,
     ) -> Result<(), WorldError> {
-        if !self.lost {
-            self.pilot.steer(&self.senses, &mut self.commands, &mut self.scratch);
-            self.lost = !self.commands.iter().all(|command| command.is_finite());
-        }
-        if self.lost {
-            self.commands.fill(0.0);
-        }
-        for ((&joint, command), most) in
-            body.driven().iter().zip(&self.commands).zip(self.pilot.speeds())
-        {
-            world.set_motor(individual, joint, command * most)?;
+        self.lost = self.lost | self.pilots.steer(&self.felt);
+        for index in 0..body.driven().len() {
+            let speed = self.pilots.commands()[index] * self.pilots.speeds()[index];
+            world.set_motor(group, body.driven()[index], speed)?;
         }
         Ok(())
     }
 
-    fn moment(&self, dt: f32) -> Moment<'_> {
-        Moment {
-            dt,
-            torso: self.torso,
-            senses: &self.senses,
-            commands: &self.commands,
-            torques: &self.torques,
+    fn shove<W: Stage<S>>(
+        &mut self,
+        world: &mut W,
+        group: usize,
+        torso: usize,
+    ) -> Result<(), WorldError> {
+        let mut signs = [0.0; 16];
+        for (sign, pusher) in signs.iter_mut().zip(&mut self.pushers) {
+            if let Some(random) = pusher {
+                *sign = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            }
         }
+        let change = self.push * self.push.load_like(&signs);
+        world.push(group, torso, [change, change.like(0.0)])
     }
 }
 
-/// Steps walkers until `watch` says of all of them that they are done, or for `steps`. Torques are
-/// read where `torques` says so. `watch(world, individual, moment)` is called after every step for
-/// everyone who is not done, and before the first one with the start pose through `begin`.
-pub(crate) fn run(
-    world: &mut World,
-    body: &Body,
-    walkers: &mut [Walker],
-    steps: u32,
-    torques: bool,
-    mut begin: impl FnMut(&World, usize, Moment<'_>),
-    mut watch: impl FnMut(&World, usize, Moment<'_>) -> bool,
-) -> Result<(), WorldError> {
-    let dt = world.dt();
-    for (individual, walker) in walkers.iter_mut().enumerate() {
-        walker.sense(world, individual, body, false);
-        begin(world, individual, walker.moment(dt));
-    }
-    let mut done = vec![false; walkers.len()];
-    for _ in 0..steps {
-        for (individual, walker) in walkers.iter_mut().enumerate() {
-            walker.steer(world, individual, body)?;
+/// Groups of individuals in their world.
+pub(crate) struct Episode<S: Simd, W> {
+    pub world: W,
+    pub crews: Vec<Crew<S>>,
+    plan: Plan,
+    step: u32,
+    between_pushes: u32,
+}
+
+impl<S: Simd, W: Stage<S>> Episode<S, W> {
+    pub fn new(world: W, mut crews: Vec<Crew<S>>, body: &Body, plan: Plan) -> Self {
+        let pushed = crews.iter().any(|crew| crew.pushers.iter().any(Option::is_some));
+        let every = (PUSH_EVERY / world.dt().lane(0)) as u32;
+        for (group, crew) in crews.iter_mut().enumerate() {
+            crew.sense(&world, group, body, false);
         }
-        world.step()?;
-        for (individual, walker) in walkers.iter_mut().enumerate() {
-            walker.sense(world, individual, body, true);
-            if done[individual] {
-                continue;
-            }
-            if torques {
-                walker.torques.clear();
-                for &joint in body.driven() {
-                    walker.torques.push(world.motor_torque(individual, joint)?);
+        let between_pushes = if pushed { every.max(1) } else { u32::MAX };
+        Self { world, crews, plan, step: 0, between_pushes }
+    }
+
+    /// Goes on for at most so many steps, and says whether it is over. `watch` is called after every
+    /// step of a group that goes on.
+    #[inline(always)]
+    pub fn advance(
+        &mut self,
+        body: &Body,
+        most: u32,
+        mut watch: impl FnMut(&W, usize, &Crew<S>),
+    ) -> Result<bool, WorldError> {
+        let last = self.plan.steps.min(self.step.saturating_add(most));
+        while self.step < last {
+            self.step += 1;
+            for (group, crew) in self.crews.iter_mut().enumerate() {
+                crew.steer(&mut self.world, group, body)?;
+                if self.step.is_multiple_of(self.between_pushes) {
+                    crew.shove(&mut self.world, group, body.torso())?;
                 }
             }
-            done[individual] = watch(world, individual, walker.moment(dt));
+            self.world.step()?;
+            let mut all_done = true;
+            for group in 0..self.crews.len() {
+                let crew = &mut self.crews[group];
+                crew.felt.time = self.world.dt() * self.step as f32;
+                crew.sense(&self.world, group, body, true);
+                if crew.done {
+                    continue;
+                }
+                for index in 0..crew.torques.len() {
+                    let joint = body.driven()[index];
+                    crew.torques[index] = self.world.motor_torque(group, joint)?;
+                }
+                let look = Look {
+                    torso: crew.torso,
+                    tilt: crew.felt.torso_rotation,
+                    angles: &crew.felt.joint_angles,
+                    speeds: &crew.felt.joint_speeds,
+                    touching: &crew.touching,
+                    commands: crew.pilots.commands(),
+                    torques: &crew.torques,
+                };
+                crew.done = !crew.meter.watch(&look).any();
+                all_done &= crew.done;
+                watch(&self.world, group, crew);
+            }
+            if all_done {
+                return Ok(true);
+            }
         }
-        if done.iter().all(|&done| done) {
-            break;
-        }
+        Ok(self.step >= self.plan.steps)
     }
-    Ok(())
 }

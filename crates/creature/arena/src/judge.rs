@@ -1,9 +1,12 @@
 //! When a motion can be used: looked at for longer than it was trained, never by its fitness.
 
 use ambulo_body::Body;
+use ambulo_lanes::{Lanes, Mask, math};
+use ambulo_world::Physics;
 use serde::Serialize;
 
-use crate::measures::{deviation, regularity, spectral_arc_length, symmetry};
+use crate::measures::{regularity, spectral_arc_length, symmetry};
+use crate::meter::{Look, Meter, Tally};
 use crate::{Arena, Rollout};
 
 /// A leg's least standard deviation of a joint, radians, and least and greatest share of steps with
@@ -29,7 +32,11 @@ pub struct Foot {
 pub struct Judgement {
     /// Whether a game could use it.
     pub usable: bool,
-    /// Why not.
+    /// Whether it is more than that: a run of more than a body length a second (without legs half),
+    /// regular above 0.9, with a cost of transport below 2 (without legs 5); a jump 1.2 times as high
+    /// as needed.
+    pub good: bool,
+    /// Why it is not usable.
     pub reasons: Vec<String>,
     /// Steps that were looked at.
     pub steps: usize,
@@ -61,114 +68,77 @@ pub struct Judgement {
     /// Spectral arc length of the torso's speed in the second half; nearer to 0 is smoother.
     pub smoothness: Option<f64>,
     /// How far the torso rose, metres; of jumps only.
-    pub gain: Option<f32>,
+    pub gain: Option<f64>,
     /// How far it must, metres; of jumps only.
-    pub gain_needed: Option<f32>,
+    pub gain_needed: Option<f64>,
     /// Each leg's foot.
     pub feet: Vec<Foot>,
 }
 
-/// A rollout and whose it is, with what tasks ask about it.
-pub struct Seen<'a> {
-    /// The creature.
-    pub body: &'a Body,
-    rollout: &'a Rollout,
-}
-
-impl Seen<'_> {
-    fn touches(&self, step: usize, part: usize) -> bool {
-        self.rollout.touching[step * self.body.parts().len() + part]
-    }
-
-    /// Share of the steps with a part on the ground.
-    fn duty(&self, part: usize) -> f64 {
-        let steps = self.rollout.steps();
-        let on = (1..=steps).filter(|&step| self.touches(step, part)).count();
-        on as f64 / steps.max(1) as f64
-    }
-
-    /// How far the torso is tilted after a step, radians, 0 to π.
-    pub fn tilt(&self, step: usize) -> f32 {
-        self.rollout.tilt[step].abs()
-    }
-
-    /// How far the torso rose at most, and when.
-    pub fn highest(&self) -> (f32, usize) {
-        let heights = self.rollout.torso.iter().map(|at| at[1]).enumerate();
-        let (step, most) = heights
-            .fold((0, f32::NEG_INFINITY), |best, now| if now.1 > best.1 { now } else { best });
-        (most - self.rollout.torso[0][1], step)
-    }
-
-    /// Whether there was a step, after the first touch, with none of these parts on the ground.
-    pub fn afloat(&self, part: impl Fn(usize) -> bool) -> bool {
-        let parts: Vec<_> = (0..self.body.parts().len()).filter(|&p| part(p)).collect();
-        let on = |step: usize| parts.iter().any(|&part| self.touches(step, part));
-        let landed = (0..=self.rollout.steps()).find(|&step| on(step));
-        landed.is_some_and(|first| (first..=self.rollout.steps()).any(|step| !on(step)))
-    }
-
-    /// Why it does not stand at the end, if it does not: over the last half second it is upright,
-    /// its torso is off the ground and at 0.6 of the standing height or more, and it has a foot on
-    /// the ground at some time.
-    pub fn lying(&self) -> Option<String> {
-        let steps = self.rollout.steps();
-        let from = steps.saturating_sub((0.5 / self.rollout.dt) as usize);
-        let tilt = (from..=steps).map(|step| self.tilt(step)).fold(0.0, f32::max);
-        if tilt >= 1.0 {
-            return Some(format!("at the end it is tilted by {tilt:.1} rad"));
-        }
-        if (from..=steps).any(|step| self.touches(step, self.body.torso())) {
-            return Some("at the end its torso is on the ground".into());
-        }
-        let low = self.rollout.torso[0][1] - 0.4 * self.body.standing_height();
-        if (from..=steps).any(|step| self.rollout.torso[step][1] < low) {
-            return Some(
-                "at the end it does not stand: its torso is below 0.6 of its height".into(),
-            );
-        }
-        let feet = self.body.legs().iter().map(|leg| leg.foot);
-        let mut feet = feet.flat_map(|foot| (from..=steps).map(move |step| (step, foot)));
-        if !feet.any(|(step, foot)| self.touches(step, foot)) {
-            return Some("at the end no foot is on the ground".into());
-        }
+/// Why a jumper does not stand at the end, if it does not: over the last half second it is upright,
+/// its torso is off the ground and at 0.6 of the standing height or more, and it has a foot on the
+/// ground at some time.
+pub(crate) fn lying(tally: &Tally, body: &Body) -> Option<String> {
+    let low = tally.start[1] - 0.4 * f64::from(body.standing_height());
+    if tally.tail_tilt >= 1.0 {
+        Some(format!("at the end it is tilted by {:.1} rad", tally.tail_tilt))
+    } else if tally.tail_torso {
+        Some("at the end its torso is on the ground".into())
+    } else if tally.tail_low < low {
+        Some("at the end it does not stand: its torso is below 0.6 of its height".into())
+    } else if !tally.tail_foot {
+        Some("at the end no foot is on the ground".into())
+    } else {
         None
     }
+}
 
-    /// Why it does not carry itself, if so. Not asked of creatures without legs: they may lie and
-    /// roll, as the seed's Apod does and is called usable (section 5.2.1).
-    pub fn posture(&self, judgement: &Judgement) -> Vec<String> {
-        let mut reasons = Vec::new();
-        if self.body.legs().is_empty() {
-            return reasons;
-        }
-        if judgement.upright <= 0.95 {
-            reasons.push(format!(
-                "upright in {:.0} % of the steps, 95 % are needed",
-                100.0 * judgement.upright
-            ));
-        }
-        if judgement.torso_contact >= 0.05 {
-            reasons.push(format!(
-                "its torso is on the ground in {:.0} % of the steps, 5 % at most",
-                100.0 * judgement.torso_contact
-            ));
-        }
+/// Why it does not carry itself, if so. Not asked of creatures without legs: they may lie and
+/// roll, as the seed's Apod does and is called usable (section 5.2.1).
+pub(crate) fn posture(tally: &Tally, body: &Body) -> Vec<String> {
+    let mut reasons = Vec::new();
+    if body.legs().is_empty() {
+        return reasons;
+    }
+    if tally.upright <= 0.95 {
+        let share = 100.0 * tally.upright;
+        reasons.push(format!("upright in {share:.0} % of the steps, 95 % are needed"));
+    }
+    if tally.torso_contact >= 0.05 {
+        let share = 100.0 * tally.torso_contact;
         reasons
+            .push(format!("its torso is on the ground in {share:.0} % of the steps, 5 % at most"));
     }
+    reasons
+}
 
-    /// Which legs, or without legs which joints, are idle, if any.
-    pub fn idle(&self, judgement: &Judgement) -> Vec<String> {
-        let idle: Vec<&str> = if self.body.legs().is_empty() {
-            let names = self.body.driven().iter().map(|&j| self.body.joints()[j].name.as_str());
-            let series = joint_series(self.rollout, 0, self.body.driven().len());
-            let still = names.zip(series).filter(|(_, angles)| deviation(angles) <= LEG_MOVES);
-            still.map(|(name, _)| name).collect()
-        } else {
-            judgement.feet.iter().filter(|foot| !foot.used).map(|foot| foot.leg.as_str()).collect()
-        };
-        if idle.is_empty() { vec![] } else { vec![format!("idle: {}", idle.join(", "))] }
+/// Whether a leg counts as used.
+fn used(tally: &Tally, body: &Body, leg: usize) -> bool {
+    let joints = body.legs()[leg].joints.iter();
+    let moves = joints.map(|&joint| tally.deviation[joint]).fold(0.0, f64::max);
+    let [least, most] = LEG_STANDS;
+    moves > LEG_MOVES && (least..=most).contains(&tally.duty[leg])
+}
+
+/// Which legs, or without legs which joints, are idle, if any.
+pub(crate) fn idle(tally: &Tally, body: &Body) -> Option<String> {
+    if body.legs().is_empty() {
+        return still(tally, body);
     }
+    let legs = (0..body.legs().len()).filter(|&leg| !used(tally, body, leg));
+    let name = |leg: usize| body.parts()[body.legs()[leg].parts[0]].name.as_str();
+    named(legs.map(name).collect())
+}
+
+/// Which joints do not move, if any.
+pub(crate) fn still(tally: &Tally, body: &Body) -> Option<String> {
+    let names = body.driven().iter().map(|&joint| body.joints()[joint].name.as_str());
+    let still = names.zip(&tally.deviation).filter(|(_, sd)| **sd <= LEG_MOVES);
+    named(still.map(|(name, _)| name).collect())
+}
+
+fn named(idle: Vec<&str>) -> Option<String> {
+    (!idle.is_empty()).then(|| format!("idle: {}", idle.join(", ")))
 }
 
 /// Angles of each joint from a step on.
@@ -178,95 +148,120 @@ fn joint_series(rollout: &Rollout, from: usize, joints: usize) -> Vec<Vec<f32>> 
 }
 
 pub(crate) fn judge(arena: &Arena, rollout: &Rollout) -> Judgement {
-    let body = arena.body();
-    let seen = Seen { body, rollout };
-    let (steps, dt) = (rollout.steps(), rollout.dt);
-    let share = |count: usize| count as f64 / steps.max(1) as f64;
-    let x = |step: usize| f64::from(rollout.torso[step][0]);
-    let speed = |from: usize, to: usize| {
-        (x(to) - x(from)) / ((to - from).max(1) as f64 * f64::from(dt) * f64::from(body.length()))
-    };
-    let quarter = steps - steps / 4;
-    let part = |i: usize| quarter + i * (steps - quarter) / 4;
+    let (body, dt) = (arena.body(), rollout.dt);
+    let steps = rollout.steps();
+    let tally = measured(body, rollout);
     let joints = body.driven().len();
     let half = joint_series(rollout, steps / 2, joints);
     let (regular, period) = regularity(&half, dt);
-    let whole = joint_series(rollout, 0, joints);
-    let saturated = rollout.commands.iter().filter(|command| command.abs() > 0.95).count();
     let torso = &rollout.torso[steps / 2..];
     let speeds: Vec<f32> = torso
         .windows(2)
         .map(|w| ((w[1][0] - w[0][0]).powi(2) + (w[1][1] - w[0][1]).powi(2)).sqrt() / dt)
         .collect();
-    let distance = x(steps) - x(0);
-    let weight = body.mass() * arena.settings().world.mass_scale * arena.settings().world.gravity;
-    let work = work(rollout, joints);
+    let length = f64::from(body.length());
+    let slowest = tally.last_speeds().into_iter().fold(f64::INFINITY, f64::min);
+    let mut reasons = arena.task().reasons(&tally, body);
+    if rollout.lost {
+        reasons.insert(0, "its controller gives something that is not a number".into());
+    }
+    let needed = arena.task().rise_needed(body);
+    let feet = feet(body, rollout, &tally, period);
     let mut judgement = Judgement {
-        usable: false,
-        reasons: vec![],
+        usable: reasons.is_empty(),
+        good: false,
+        reasons,
         steps,
-        distance,
-        speed_bl_s: speed(quarter, steps),
-        slowest_bl_s: (0..4).map(|i| speed(part(i), part(i + 1))).fold(f64::INFINITY, f64::min),
-        upright: share((1..=steps).filter(|&step| seen.tilt(step) < 1.0).count()),
-        torso_contact: seen.duty(body.torso()),
-        legs_used: 0,
+        distance: tally.distance(),
+        speed_bl_s: tally.last_speed() / length,
+        slowest_bl_s: slowest / length,
+        upright: tally.upright,
+        torso_contact: tally.torso_contact,
+        legs_used: feet.iter().filter(|foot| foot.used).count(),
         legs: body.legs().len(),
         regularity: regular,
         period_s: period,
-        cost_of_transport: (distance > 0.1).then(|| work / (f64::from(weight) * distance)),
+        cost_of_transport: cost_of_transport(&tally, body, &arena.settings().world),
         symmetry: symmetry(&half, body.pairs(), period, dt),
-        saturation: saturated as f64 / rollout.commands.len().max(1) as f64,
+        saturation: tally.saturation,
         smoothness: spectral_arc_length(&speeds, dt),
-        gain: None,
-        gain_needed: None,
-        feet: feet(&seen, &whole, period),
+        gain: needed.map(|_| tally.rise),
+        gain_needed: needed,
+        feet,
     };
-    judgement.legs_used = judgement.feet.iter().filter(|foot| foot.used).count();
-    let mut reasons = arena.task().reasons(&seen, &mut judgement);
-    if rollout.lost {
-        reasons.insert(0, "its network gives something that is not a number".into());
-    }
-    judgement.usable = reasons.is_empty();
-    judgement.reasons = reasons;
+    judgement.good = judgement.usable && is_good(&judgement);
     judgement
 }
 
-/// Σ|torque · speed| dt, joules.
-fn work(rollout: &Rollout, joints: usize) -> f64 {
-    let after = rollout.angles.iter().skip(joints);
-    let turned =
-        after.zip(&rollout.angles).map(|(now, before)| crate::measures::wrap(now - before));
-    turned.zip(&rollout.torques).map(|(turn, torque)| f64::from((turn * torque).abs())).sum()
+/// More than usable: running, fast, regular and cheap; jumping, higher than needed.
+fn is_good(judgement: &Judgement) -> bool {
+    if let (Some(gain), Some(needed)) = (judgement.gain, judgement.gain_needed) {
+        return gain > 1.2 * needed;
+    }
+    let (speed, cost) = if judgement.legs == 0 { (0.5, 5.0) } else { (1.0, 2.0) };
+    judgement.speed_bl_s > speed
+        && judgement.regularity.is_some_and(|regular| regular > 0.9)
+        && judgement.cost_of_transport.is_some_and(|paid| paid < cost)
 }
 
-fn feet(seen: &Seen<'_>, angles: &[Vec<f32>], period: Option<f64>) -> Vec<Foot> {
-    let first = seen.body.legs().first().map(|leg| leg.foot);
-    let foot = |leg: &ambulo_body::Leg| {
-        let duty = seen.duty(leg.foot);
-        let moves = leg.joints.iter().map(|&joint| deviation(&angles[joint])).fold(0.0, f64::max);
-        let [least, most] = LEG_STANDS;
+/// Σ|torque · speed| dt / (mass · gravity · distance); none without a way forward.
+fn cost_of_transport(tally: &Tally, body: &Body, physics: &Physics) -> Option<f64> {
+    let weight = f64::from(body.mass() * physics.mass_scale * physics.gravity);
+    (tally.distance() > 0.1).then(|| tally.work / (weight * tally.distance()))
+}
+
+/// Measures a recording as an episode is measured when it happens.
+fn measured(body: &Body, rollout: &Rollout) -> Tally {
+    let (parts, joints) = (body.parts().len(), body.driven().len());
+    let lanes = |values: &[f32]| values.iter().map(|&v| Lanes::from(v)).collect::<Vec<_>>();
+    let touching = |step: usize| {
+        let parts = &rollout.touching[step * parts..(step + 1) * parts];
+        parts.iter().map(|&on| Mask::from(on)).collect::<Vec<_>>()
+    };
+    let (steps, dt) = (rollout.steps(), Lanes::from(rollout.dt));
+    let start = rollout.torso[0].map(Lanes::from);
+    let mut meter = Meter::new(body, dt, start, &touching(0), steps as u32, false, false);
+    for step in 1..=steps {
+        let row = |values: &[f32], step: usize| lanes(&values[step * joints..(step + 1) * joints]);
+        let (now, before) = (row(&rollout.angles, step), row(&rollout.angles, step - 1));
+        let speed = |(a, b): (&Lanes<_>, &Lanes<_>)| math::wrap(*a - *b) * (dt.like(1.0) / dt);
+        meter.watch(&Look {
+            torso: rollout.torso[step].map(Lanes::from),
+            tilt: rollout.tilt[step].into(),
+            speeds: &now.iter().zip(&before).map(speed).collect::<Vec<_>>(),
+            angles: &now,
+            touching: &touching(step),
+            commands: &row(&rollout.commands, step - 1),
+            torques: &row(&rollout.torques, step - 1),
+        });
+    }
+    meter.tally(0)
+}
+
+fn feet(body: &Body, rollout: &Rollout, tally: &Tally, period: Option<f64>) -> Vec<Foot> {
+    let first = body.legs().first().map(|leg| leg.foot);
+    let foot = |(index, leg): (usize, &ambulo_body::Leg)| {
         let after = period.zip(first).and_then(|(period, first)| {
-            let cycle = period / f64::from(seen.rollout.dt);
-            phase(seen, first, leg.foot, cycle)
+            phase(body, rollout, first, leg.foot, period / f64::from(rollout.dt))
         });
         Foot {
-            leg: seen.body.parts()[leg.parts[0]].name.clone(),
-            duty,
+            leg: body.parts()[leg.parts[0]].name.clone(),
+            duty: tally.duty[index],
             phase: after,
-            used: moves > LEG_MOVES && (least..=most).contains(&duty),
+            used: used(tally, body, index),
         }
     };
-    seen.body.legs().iter().map(foot).collect()
+    body.legs().iter().enumerate().map(foot).collect()
 }
 
 /// How much later than `first` a foot lands, as a part of the cycle (in steps), 0 to 1: the circular
 /// mean over the second half.
-fn phase(seen: &Seen<'_>, first: usize, foot: usize, cycle: f64) -> Option<f64> {
-    let steps = seen.rollout.steps();
+fn phase(body: &Body, rollout: &Rollout, first: usize, foot: usize, cycle: f64) -> Option<f64> {
+    let steps = rollout.steps();
+    let touches = |step: usize, part: usize| rollout.touching[step * body.parts().len() + part];
     let mean = |part: usize| {
-        let landings = (steps / 2 + 1..=steps)
-            .filter(|&step| seen.touches(step, part) && !seen.touches(step - 1, part));
+        let landings =
+            (steps / 2 + 1..=steps).filter(|&step| touches(step, part) && !touches(step - 1, part));
         let angle = |step: usize| std::f64::consts::TAU * step as f64 / cycle;
         let sum = landings.fold([0.0, 0.0, 0.0], |[x, y, n], step| {
             let (sin, cos) = libm::sincos(angle(step));

@@ -1,25 +1,5 @@
 //! Figures of motions. None is proven to mean "looks natural".
 
-use std::f32::consts::{PI, TAU};
-
-/// An angle's difference within −π to π.
-pub(crate) fn wrap(angle: f32) -> f32 {
-    if angle > PI {
-        angle - TAU
-    } else if angle < -PI {
-        angle + TAU
-    } else {
-        angle
-    }
-}
-
-/// Standard deviation.
-pub(crate) fn deviation(values: &[f32]) -> f64 {
-    let count = values.len().max(1) as f64;
-    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / count;
-    (values.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / count).sqrt()
-}
-
 /// How well joint angles repeat themselves, and the period in seconds: the highest peak of the
 /// autocorrelation of all series together, from 0.1 s to 4 s. 1 is exact; none if nothing moves.
 pub(crate) fn regularity(series: &[Vec<f32>], dt: f32) -> (Option<f64>, Option<f64>) {
@@ -123,6 +103,7 @@ pub(crate) fn spectral_arc_length(speeds: &[f32], dt: f32) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f32::consts::TAU;
 
     fn wave(period: f32, shift: f32, steps: usize) -> Vec<f32> {
         (0..steps).map(|t| (TAU * (t as f32 / 60.0 / period + shift)).sin()).collect()

@@ -1,8 +1,12 @@
 //! An episode, kept whole.
 
-use ambulo_world::World;
+use ambulo_body::Body;
+use ambulo_lanes::{Lanes, Scalar};
+use ambulo_world::{Pose, Solver, Stage};
 
-use crate::episode::{Walker, run};
+use crate::arena::FIRST_PUSHES;
+use crate::episode::{Episode, Plan};
+use crate::trials::{Trial, in_lanes, in_world};
 use crate::{Arena, ArenaError};
 
 /// T steps of one individual of P parts and J driven joints; all row-major.
@@ -40,50 +44,51 @@ impl Rollout {
 }
 
 pub(crate) fn record(arena: &Arena, genome: &[f32], steps: u32) -> Result<Rollout, ArenaError> {
-    let body = arena.body();
-    let mut world = World::new(body, &arena.settings().world, 1)?;
-    let mut walkers = [Walker::new(arena.pilot(genome)?, body)];
-    let rollout = std::cell::RefCell::new(Rollout {
-        dt: world.dt(),
+    let (body, physics) = (arena.body(), arena.settings().world);
+    let pushes = arena.task().pushed().then_some(FIRST_PUSHES);
+    let trial = Trial { body, genome, physics, pushes };
+    let plan = Plan { steps, falls: false, torques: true, series: false };
+    let controller = &arena.settings().controller;
+    match physics.solver {
+        Solver::Lockstep => watched(in_lanes(Scalar, &[trial], controller, plan)?, body),
+        Solver::Box2d => watched(in_world(&[trial], controller, plan)?, body),
+    }
+}
+
+fn watched<W: Stage<Scalar>>(
+    mut episode: Episode<Scalar, W>,
+    body: &Body,
+) -> Result<Rollout, ArenaError> {
+    let (parts, joints) = (body.parts().len(), body.driven().len());
+    let mut rollout = Rollout {
+        dt: episode.world.dt().value(),
         poses: Vec::new(),
-        touching: Vec::new(),
-        angles: Vec::new(),
+        touching: vec![false; parts],
+        angles: vec![0.0; joints],
         commands: Vec::new(),
         torques: Vec::new(),
-        torso: Vec::new(),
-        tilt: Vec::new(),
-        ground: world.ground().points().to_vec(),
-        hash: 0,
+        torso: vec![episode.crews[0].torso.map(Lanes::value)],
+        tilt: vec![0.0],
+        ground: episode.world.ground().points().to_vec(),
+        hash: episode.world.hash(0, 0, 0),
         lost: false,
-    });
-    let look = |world: &World, moment: &crate::episode::Moment<'_>| {
-        let mut rollout = rollout.borrow_mut();
-        for part in 0..body.parts().len() {
-            let pose = world.pose(0, part);
-            rollout.poses.extend([pose.x, pose.y, pose.angle]);
-            rollout.touching.push(world.touches(0, part));
-        }
-        rollout.angles.extend(&moment.senses.joint_angles);
-        rollout.torso.push(moment.torso);
-        rollout.tilt.push(moment.senses.torso_rotation);
-        rollout.hash = world.hash(0, rollout.hash);
     };
-    run(
-        &mut world,
-        body,
-        &mut walkers,
-        steps,
-        true,
-        |world, _, moment| look(world, &moment),
-        |world, _, moment| {
-            look(world, &moment);
-            let mut rollout = rollout.borrow_mut();
-            rollout.commands.extend(moment.commands);
-            rollout.torques.extend(moment.torques);
-            false
-        },
-    )?;
-    let mut rollout = rollout.into_inner();
-    rollout.lost = walkers[0].lost;
+    rollout.poses.extend((0..parts).flat_map(|part| flat(episode.world.pose(0, 0, part))));
+    episode.advance(body, u32::MAX, |world, _, crew| {
+        rollout.poses.extend((0..parts).flat_map(|part| flat(world.pose(0, 0, part))));
+        rollout.touching.extend(crew.touching.iter().map(|on| on.lane(0)));
+        let values = |lanes: &[Lanes<Scalar>]| lanes.iter().map(|v| v.value()).collect::<Vec<_>>();
+        rollout.angles.extend(values(&crew.felt.joint_angles));
+        rollout.commands.extend(values(crew.commands()));
+        rollout.torques.extend(values(&crew.torques));
+        rollout.torso.push(crew.torso.map(Lanes::value));
+        rollout.tilt.push(crew.felt.torso_rotation.value());
+        rollout.hash = world.hash(0, 0, rollout.hash);
+        rollout.lost = crew.lost.lane(0);
+    })?;
     Ok(rollout)
+}
+
+fn flat(pose: Pose) -> [f32; 3] {
+    [pose.x, pose.y, pose.angle]
 }

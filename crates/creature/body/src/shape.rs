@@ -43,6 +43,35 @@ impl Shape {
         sum.map(|v| v / (6.0 * area))
     }
 
+    /// Second moment of area about the centre of mass, metres⁴: times the density it is the moment of
+    /// inertia.
+    pub fn second_moment(&self) -> f32 {
+        let pi = std::f32::consts::PI;
+        match self {
+            Shape::Box { width: w, height: h } => w * h * (w * w + h * h) / 12.0,
+            Shape::Circle { radius: r } => 0.5 * pi * r * r * r * r,
+            Shape::Capsule { length, radius: r } => {
+                let middle = 2.0 * r * length * (length * length + 4.0 * r * r) / 12.0;
+                // Each half circle: about its own centroid, which is `off` from its flat side, and
+                // from there to the middle.
+                let (area, off) = (0.5 * pi * r * r, 4.0 * r / (3.0 * pi));
+                let own = 0.25 * pi * r * r * r * r - area * off * off;
+                middle + 2.0 * (own + area * (0.5 * length + off).powi(2))
+            }
+            Shape::Polygon { points } => {
+                let [cx, cy] = self.centre();
+                let points: Vec<_> = points.iter().map(|[x, y]| [x - cx, y - cy]).collect();
+                let sum: f32 = edges(&points)
+                    .map(|([ax, ay], [bx, by])| {
+                        let square = ax * ax + ay * ay + ax * bx + ay * by + bx * bx + by * by;
+                        (ax * by - ay * bx) * square
+                    })
+                    .sum();
+                sum.abs() / 12.0
+            }
+        }
+    }
+
     /// Corners around which the outline lies, counter-clockwise, and its distance from their hull:
     /// a circle is one point with its radius.
     pub fn hull(&self) -> (Vec<[f32; 2]>, f32) {
@@ -57,6 +86,12 @@ impl Shape {
             }
             Shape::Polygon { points } => (counter_clockwise(points), 0.0),
         }
+    }
+
+    /// Width and height in the part's own frame, metres.
+    pub fn extent(&self) -> [f32; 2] {
+        let [l, b, r, t] = self.bounds([0.0, 0.0], 0.0);
+        [r - l, t - b]
     }
 
     /// Least x, least y, greatest x, greatest y of the outline at a place, metres.
@@ -85,6 +120,41 @@ mod tests {
             assert!((centre[0] - 1.0).abs() < 1e-6 && (centre[1] - 0.5).abs() < 1e-6);
             assert!(signed_area(&shape.hull().0) > 0.0);
             points.reverse();
+        }
+    }
+
+    /// Summed over a fine grid of points inside.
+    #[test]
+    fn second_moments_are_those_of_the_outlines() {
+        let capsule = Shape::Capsule { length: 0.6, radius: 0.2 };
+        let inside_capsule = |x: f32, y: f32| x * x + (y.abs() - 0.3).max(0.0).powi(2) <= 0.04;
+        let triangle = Shape::Polygon { points: vec![[0.0, 0.0], [0.9, 0.0], [0.0, 0.6]] };
+        let inside_triangle = |x: f32, y: f32| {
+            let (x, y) = (x + 0.3, y + 0.2);
+            x >= 0.0 && y >= 0.0 && x / 0.9 + y / 0.6 <= 1.0
+        };
+        let box_ = Shape::Box { width: 0.8, height: 0.5 };
+        let circle = Shape::Circle { radius: 0.4 };
+        type Inside<'a> = &'a dyn Fn(f32, f32) -> bool;
+        let cases: [(&Shape, Inside<'_>); 4] = [
+            (&capsule, &inside_capsule),
+            (&triangle, &inside_triangle),
+            (&box_, &|x, y| x.abs() <= 0.4 && y.abs() <= 0.25),
+            (&circle, &|x, y| x * x + y * y <= 0.16),
+        ];
+        for (shape, inside) in cases {
+            let cell = 2e-3f32;
+            let mut sum = 0.0;
+            for i in -500..500 {
+                for j in -500..500 {
+                    let (x, y) = ((i as f32 + 0.5) * cell, (j as f32 + 0.5) * cell);
+                    if inside(x, y) {
+                        sum += f64::from((x * x + y * y) * cell * cell);
+                    }
+                }
+            }
+            let got = f64::from(shape.second_moment());
+            assert!((got / sum - 1.0).abs() < 0.01, "{shape:?}: {got} and {sum}");
         }
     }
 

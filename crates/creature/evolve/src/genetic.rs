@@ -6,7 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{EvolveError, Random};
+use crate::common::{SHARE, as_many, countable, fit, in_range, ranking, scattered, some_genes};
+use crate::{EvolveError, Outcome, Random, Strategy};
 
 /// How a fitness becomes a share of the roulette wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,11 +58,10 @@ impl GeneticSettings {
     /// # Errors
     /// The first setting that is out of range.
     pub fn check(&self) -> Result<(), EvolveError> {
-        let share = "0 to 1";
-        let fields = [
+        in_range(&[
             ("population", self.population as f64, 2.0, 1e5, "2 to 100000"),
-            ("crossover", self.crossover, 0.0, 1.0, share),
-            ("mutation_rate", self.mutation_rate, 0.0, 1.0, share),
+            ("crossover", self.crossover, 0.0, 1.0, SHARE),
+            ("mutation_rate", self.mutation_rate, 0.0, 1.0, SHARE),
             ("mutation_limit", f64::from(self.mutation_limit), 0.0, 100.0, "0 to 100"),
             (
                 "elites",
@@ -71,15 +71,7 @@ impl GeneticSettings {
                 "0 to less than the population",
             ),
             ("start", f64::from(self.start), 0.0, 100.0, "0 to 100"),
-        ];
-        let bad =
-            fields.into_iter().find(|(_, value, low, high, _)| !(*low..=*high).contains(value));
-        match bad {
-            Some((field, value, _, _, expected)) => {
-                Err(EvolveError::Setting { field, value, expected })
-            }
-            None => Ok(()),
-        }
+        ])
     }
 }
 
@@ -101,53 +93,17 @@ impl Genetic {
     /// Settings out of range, no genes.
     pub fn new(settings: GeneticSettings, genes: usize, seed: u64) -> Result<Self, EvolveError> {
         settings.check()?;
-        if genes == 0 {
-            return Err(EvolveError::State("genomes of no genes".into()));
-        }
+        some_genes(genes)?;
         let mut random = Random::new(seed);
-        let mut genome = || (0..genes).map(|_| random.around(settings.start)).collect();
-        let genomes = (0..settings.population).map(|_| genome()).collect();
+        let genomes = (0..settings.population)
+            .map(|_| scattered(genes, settings.start, &mut random))
+            .collect();
         Ok(Self { settings, genes, generation: 0, random, genomes })
     }
 
     /// Its settings.
     pub fn settings(&self) -> &GeneticSettings {
         &self.settings
-    }
-
-    /// How many generations were told.
-    pub fn generation(&self) -> u64 {
-        self.generation
-    }
-
-    /// The genomes whose fitness it wants to know.
-    pub fn ask(&self) -> &[Vec<f32>] {
-        &self.genomes
-    }
-
-    /// Takes a fitness for each genome, more is better, and makes the next generation. A fitness
-    /// that is not finite is worse than any that is, and has no children.
-    ///
-    /// # Errors
-    /// Another number of them than genomes.
-    pub fn tell(&mut self, fitness: &[f64]) -> Result<(), EvolveError> {
-        if fitness.len() != self.genomes.len() {
-            let (got, expected) = (fitness.len(), self.genomes.len());
-            return Err(EvolveError::Count { got, expected });
-        }
-        let wheel = wheel(fitness, self.settings.selection);
-        let mut next: Vec<_> = ranking(fitness)
-            .into_iter()
-            .take(self.settings.elites)
-            .filter(|&index| fitness[index].is_finite())
-            .map(|index| self.genomes[index].clone())
-            .collect();
-        while next.len() < self.settings.population {
-            next.push(self.child(&wheel));
-        }
-        self.genomes = next;
-        self.generation += 1;
-        Ok(())
     }
 
     fn child(&mut self, wheel: &[f64]) -> Vec<f32> {
@@ -167,46 +123,53 @@ impl Genetic {
         }
         child
     }
+}
 
-    /// Checks a state that was stored.
-    ///
-    /// # Errors
-    /// Settings out of range, genomes that are not what they say.
-    pub fn check(&self) -> Result<(), EvolveError> {
-        self.settings.check()?;
-        let fits = |genome: &Vec<f32>| {
-            genome.len() == self.genes && genome.iter().all(|gene| gene.is_finite())
-        };
-        if self.genes == 0
-            || self.genomes.len() != self.settings.population
-            || !self.genomes.iter().all(fits)
-        {
-            return Err(EvolveError::State("genomes that are not as its settings say".into()));
+impl Strategy for Genetic {
+    fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    fn ask(&self) -> &[Vec<f32>] {
+        &self.genomes
+    }
+
+    /// A fitness that is not finite has no children.
+    fn tell(&mut self, outcomes: &[Outcome]) -> Result<(), EvolveError> {
+        as_many(outcomes, &self.genomes)?;
+        let wheel = wheel(outcomes, self.settings.selection);
+        let mut next: Vec<_> = ranking(outcomes)
+            .into_iter()
+            .take(self.settings.elites)
+            .filter(|&index| outcomes[index].fitness.is_finite())
+            .map(|index| self.genomes[index].clone())
+            .collect();
+        while next.len() < self.settings.population {
+            next.push(self.child(&wheel));
         }
+        self.genomes = next;
+        self.generation += 1;
         Ok(())
+    }
+
+    fn check(&self) -> Result<(), EvolveError> {
+        self.settings.check()?;
+        countable(self.generation)?;
+        fit(&self.genomes, self.settings.population, self.genes)
     }
 }
 
-/// Best first; ties by index; what is not finite last.
-fn ranking(fitness: &[f64]) -> Vec<usize> {
-    let value = |index: usize| {
-        if fitness[index].is_finite() { fitness[index] } else { f64::NEG_INFINITY }
-    };
-    let mut order: Vec<_> = (0..fitness.len()).collect();
-    order.sort_by(|&a, &b| value(b).total_cmp(&value(a)).then(a.cmp(&b)));
-    order
-}
-
 /// Where each one's share of the wheel ends; the last is the whole.
-fn wheel(fitness: &[f64], selection: Selection) -> Vec<f64> {
-    let finite = || fitness.iter().copied().filter(|value| value.is_finite());
+fn wheel(outcomes: &[Outcome], selection: Selection) -> Vec<f64> {
+    let fitness = || outcomes.iter().map(|outcome| outcome.fitness);
+    let finite = || fitness().filter(|value| value.is_finite());
     let floor = match selection {
         Selection::Proportional => 0.0,
         Selection::Windowed => finite().fold(f64::INFINITY, f64::min),
     };
     // A share of the largest, so that no sum overflows.
     let most = finite().map(|value| value - floor).fold(0.0, f64::max);
-    let share = |value: &f64| {
+    let share = |value: f64| {
         if !value.is_finite() {
             0.0
         } else if most > 0.0 {
@@ -215,7 +178,7 @@ fn wheel(fitness: &[f64], selection: Selection) -> Vec<f64> {
             1.0
         }
     };
-    let mut shares: Vec<_> = fitness.iter().map(share).collect();
+    let mut shares: Vec<_> = fitness().map(share).collect();
     if shares.iter().all(|&share| share == 0.0) {
         shares.fill(1.0);
     }
@@ -236,45 +199,10 @@ fn spin(wheel: &[f64], turn: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
+    use proptest::prelude::{any, prop, prop_assert, proptest};
 
-    fn sphere(genome: &[f32]) -> f64 {
-        1.0 / (1.0 + genome.iter().map(|&g| f64::from(g - 0.5).powi(2)).sum::<f64>())
-    }
-
-    fn evolved(seed: u64, generations: usize) -> Genetic {
-        let mut search = Genetic::new(GeneticSettings::default(), 6, seed).unwrap();
-        for _ in 0..generations {
-            let fitness: Vec<_> = search.ask().iter().map(|genome| sphere(genome)).collect();
-            search.tell(&fitness).unwrap();
-        }
-        search
-    }
-
-    fn best(search: &Genetic) -> f64 {
-        search.ask().iter().map(|genome| sphere(genome)).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn finds_the_top_of_a_hill() {
-        for seed in 0..3 {
-            let (before, after) = (best(&evolved(seed, 0)), best(&evolved(seed, 300)));
-            assert!(before < 0.9 && after > 0.97, "seed {seed}: {before} to {after}");
-        }
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_genomes_and_a_stored_state_goes_on_with_them() {
-        assert_eq!(evolved(7, 20), evolved(7, 20));
-        assert_ne!(evolved(7, 20), evolved(8, 20));
-        let stored = serde_json::to_string(&evolved(7, 10)).unwrap();
-        let mut back: Genetic = serde_json::from_str(&stored).unwrap();
-        back.check().unwrap();
-        for _ in 0..10 {
-            let fitness: Vec<_> = back.ask().iter().map(|genome| sphere(genome)).collect();
-            back.tell(&fitness).unwrap();
-        }
-        assert_eq!(back, evolved(7, 20));
+    fn told(fitness: &[f64]) -> Vec<Outcome> {
+        fitness.iter().map(|&fitness| Outcome { fitness, behaviour: vec![] }).collect()
     }
 
     #[test]
@@ -283,14 +211,25 @@ mod tests {
         let (third, ninth) = (search.ask()[3].clone(), search.ask()[9].clone());
         let mut fitness = vec![1.0; 50];
         (fitness[9], fitness[3]) = (3.0, 2.0);
-        search.tell(&fitness).unwrap();
+        search.tell(&told(&fitness)).unwrap();
         assert_eq!(search.ask()[..2], [ninth, third]);
         assert_eq!(search.generation(), 1);
     }
 
     #[test]
+    fn no_elite_is_not_finite() {
+        let settings = GeneticSettings { mutation_rate: 0.0, ..GeneticSettings::default() };
+        let mut search = Genetic::new(settings, 4, 1).unwrap();
+        let only = search.ask()[7].clone();
+        let mut fitness = vec![f64::INFINITY; 50];
+        fitness[7] = 2.0;
+        search.tell(&told(&fitness)).unwrap();
+        assert!(search.ask().iter().all(|genome| *genome == only));
+    }
+
+    #[test]
     fn the_wheel_is_in_proportion() {
-        let ends = wheel(&[1.0, 3.0, -5.0, f64::NAN, 4.0], Selection::Proportional);
+        let ends = wheel(&told(&[1.0, 3.0, -5.0, f64::NAN, 4.0]), Selection::Proportional);
         let mut counts = [0; 5];
         let mut random = Random::new(3);
         for _ in 0..80_000 {
@@ -299,10 +238,10 @@ mod tests {
         for (count, expected) in counts.into_iter().zip([10_000, 30_000, 0, 0, 40_000]) {
             assert!((count as i64 - expected as i64).abs() < 600, "{counts:?}");
         }
-        let windowed = wheel(&[-3.0, -1.0, f64::INFINITY], Selection::Windowed);
+        let windowed = wheel(&told(&[-3.0, -1.0, f64::INFINITY]), Selection::Windowed);
         assert_eq!(windowed, [0.0, 1.0, 1.0]);
         for hopeless in [[f64::NAN; 3], [-1.0; 3]] {
-            assert_eq!(wheel(&hopeless, Selection::Proportional), [1.0, 2.0, 3.0]);
+            assert_eq!(wheel(&told(&hopeless), Selection::Proportional), [1.0, 2.0, 3.0]);
         }
     }
 
@@ -317,7 +256,7 @@ mod tests {
         };
         let mut search = Genetic::new(settings, 12, 5).unwrap();
         let parents = search.ask().to_vec();
-        search.tell(&[1.0; 50]).unwrap();
+        search.tell(&told(&[1.0; 50])).unwrap();
         let mut mixed = 0;
         for child in search.ask() {
             let from: Vec<_> = (0..12)
@@ -338,7 +277,7 @@ mod tests {
         // One parent of all.
         let mut fitness = vec![0.0; 50];
         fitness[0] = 1.0;
-        search.tell(&fitness).unwrap();
+        search.tell(&told(&fitness)).unwrap();
         let changes = search.ask().iter().flat_map(|child| {
             child.iter().zip(&parents[0]).map(|(a, b)| (a - b).abs()).filter(|d| *d > 0.0)
         });
@@ -349,21 +288,29 @@ mod tests {
     }
 
     #[test]
-    fn refuses_settings_and_counts() {
-        let with = |change: fn(&mut GeneticSettings)| {
-            let mut settings = GeneticSettings::default();
-            change(&mut settings);
-            Genetic::new(settings, 3, 1).unwrap_err().to_string()
-        };
-        assert_eq!(with(|s| s.population = 1), "evolution.population: 1 is not 2 to 100000");
-        assert_eq!(with(|s| s.mutation_rate = 1.5), "evolution.mutation_rate: 1.5 is not 0 to 1");
-        assert!(with(|s| s.elites = 50).contains("less than the population"));
-        assert!(with(|s| s.start = f32::NAN).contains("evolution.start"));
-        let mut search = Genetic::new(GeneticSettings::default(), 3, 1).unwrap();
-        assert_eq!(search.tell(&[1.0]).unwrap_err(), EvolveError::Count { got: 1, expected: 50 });
-        let mut broken = search.clone();
-        broken.genomes[1].pop();
-        assert!(broken.check().is_err());
+    fn elites_are_less_than_the_population() {
+        let settings = GeneticSettings { elites: 50, ..GeneticSettings::default() };
+        let error = Genetic::new(settings, 3, 1).unwrap_err().to_string();
+        assert_eq!(error, "evolution.elites: 50 is not 0 to less than the population");
+    }
+
+    /// The stream is part of what a seed means: results that were published stay as they are.
+    #[test]
+    fn the_genomes_of_a_seed_never_change() {
+        let mut search = Genetic::new(GeneticSettings::default(), 6, 7).unwrap();
+        for _ in 0..20 {
+            let sums: Vec<f64> = search
+                .ask()
+                .iter()
+                .map(|genome| genome.iter().map(|&g| f64::from(g)).sum())
+                .collect();
+            search.tell(&told(&sums)).unwrap();
+        }
+        let bits = search.ask().iter().flatten().map(|gene| u64::from(gene.to_bits()));
+        let hash = bits.fold(0xCBF2_9CE4_8422_2325, |hash: u64, word| {
+            (hash ^ word).wrapping_mul(0x0000_0100_0000_01B3)
+        });
+        assert_eq!(hash, 0x49F7_8862_5CD1_AC87);
     }
 
     proptest! {
@@ -378,7 +325,7 @@ mod tests {
             };
             let mut search = Genetic::new(settings, 3, seed).unwrap();
             let parents = search.ask().to_vec();
-            search.tell(&fitness).unwrap();
+            search.tell(&told(&fitness)).unwrap();
             search.check().unwrap();
             if fitness.iter().any(|value| value.is_finite()) {
                 for child in search.ask() {

@@ -1,13 +1,14 @@
-//! A controller as a bundle: the network, its make, and the creature that it belongs to.
+//! A controller as a bundle: its numbers, its make, and the creature that it belongs to.
 
 use std::collections::BTreeMap;
 
 use ambulo_body::{Body, BodyError, Description};
-use ambulo_net::{BundleError, BundleOf, FORMAT_VERSION, Header, LayoutTable, Mlp, Precision};
+use ambulo_net::{
+    BundleError, BundleOf, FORMAT_VERSION, Genes, Header, LayoutTable, Mlp, Precision, Weights,
+};
 use serde::{Deserialize, Serialize};
 
-use crate::pilot::blocks;
-use crate::{Pilot, PilotError, Settings};
+use crate::{Kind, Pilot, PilotError, Settings};
 
 /// The creature that a controller was made for; all of it, so that a controller's file is enough.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,18 +80,29 @@ impl Pilot {
         let mut parts = parts;
         parts.insert("creature".into(), json("creature", reference)?);
         parts.insert("controller".into(), json("controller", settings)?);
-        let layout = layout(self, body);
-        let header = Header {
+        let header = |kind: &str, activation: &str| Header {
             format: FORMAT_VERSION,
-            kind: "mlp".into(),
-            activation: self.network().activation().name().into(),
+            kind: kind.into(),
+            activation: activation.into(),
             fps: rate,
-            layout,
+            layout: layout(self, body),
             licence: licence.into(),
             provenance,
             parts,
         };
-        Ok(BundleOf::new(header, self.network().clone())?.to_bytes(Precision::Single)?)
+        let bytes = match self.network() {
+            Some(network) => {
+                let header = header(Mlp::KIND, network.activation().name());
+                BundleOf::new(header, network)?.to_bytes(Precision::Single)
+            }
+            None => {
+                let inputs = self.blocks().iter().map(|(_, width)| width).sum();
+                let genome = self.genome().to_vec();
+                let genes = Genes { widths: [inputs, self.joints()], genome };
+                BundleOf::new(header(Genes::KIND, "none"), genes)?.to_bytes(Precision::Single)
+            }
+        };
+        Ok(bytes?)
     }
 
     /// A controller, the creature that it was made for, and the header it came with.
@@ -98,29 +110,42 @@ impl Pilot {
     /// # Errors
     /// Bytes that are no bundle, no controller, or one whose parts do not belong together.
     pub fn from_bytes(bytes: &[u8]) -> Result<(Self, Body, Header), PilotFileError> {
-        let bundle = BundleOf::<Mlp>::from_bytes(bytes)?;
-        let reference: CreatureReference = part(bundle.header(), "creature")?;
-        let settings: Settings = part(bundle.header(), "controller")?;
+        let header = Header::from_bytes(bytes)?;
+        if header.kind != Genes::KIND {
+            // What is of another kind says so before anything is missed in it.
+            BundleOf::<Mlp>::from_bytes(bytes)?;
+        }
+        let reference: CreatureReference = part(&header, "creature")?;
+        let settings: Settings = part(&header, "controller")?;
         let body = Body::new(reference.description)?;
         let found = format!("{:016x}", body.hash());
         if found != reference.hash {
             return Err(PilotFileError::Hash { found, said: reference.hash });
         }
-        let expected = Pilot::widths(&body, &settings)?;
-        if bundle.network().widths() != expected {
-            let found = bundle.network().widths().to_vec();
-            return Err(PilotFileError::Widths { found, expected });
+        let plain = settings.kind.unwrap_or(Kind::Network) == Kind::Network;
+        let (genome, network) = if plain {
+            let bundle = BundleOf::<Mlp>::from_bytes(bytes)?;
+            (bundle.network().genome().to_vec(), Some(bundle.network().clone()))
+        } else {
+            (BundleOf::<Genes>::from_bytes(bytes)?.network().genome.clone(), None)
+        };
+        if let Some(network) = &network {
+            let expected = Pilot::widths(&body, &settings)?;
+            if network.widths() != expected {
+                let found = network.widths().to_vec();
+                return Err(PilotFileError::Widths { found, expected });
+            }
         }
-        let pilot = Pilot::new(&body, &settings, bundle.network().genome())?;
-        if pilot.network() != bundle.network() {
+        let pilot = Pilot::new(&body, &settings, &genome)?;
+        if pilot.network() != network {
             return Err(PilotFileError::Activation);
         }
-        let (found, expected) = (&bundle.header().layout, layout(&pilot, &body));
+        let (found, expected) = (&header.layout, layout(&pilot, &body));
         if *found != expected {
             let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
             return Err(PilotFileError::Layout { found, expected });
         }
-        Ok((pilot, body, bundle.header().clone()))
+        Ok((pilot, body, header))
     }
 }
 
@@ -129,7 +154,7 @@ fn layout(pilot: &Pilot, body: &Body) -> LayoutTable {
     LayoutTable {
         name: "creature".into(),
         hash: format!("{:016x}", body.hash()),
-        inputs: blocks(pilot),
+        inputs: pilot.blocks(),
         outputs: vec![("motor_speeds".into(), pilot.joints())],
     }
 }

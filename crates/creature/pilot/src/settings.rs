@@ -34,10 +34,65 @@ pub enum Scaling {
     Three,
 }
 
+/// What a controller is made of. Where angles are asked of a joint, its motor follows them as a servo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The seed's: senses through a network to motor speeds.
+    Network,
+    /// The same with sine and cosine of a clock among its inputs, the clock's frequency a gene, and
+    /// angles for its outputs.
+    PhaseNetwork,
+    /// Each joint swings: amplitude, phase and offset of its own, one frequency for all.
+    Oscillator,
+    /// An oscillator whose angles a network corrects.
+    OscillatorNetwork,
+    /// Four poses, one after the other, each for a time of its own: for what is done once.
+    Poses,
+    /// The seed's senses and motor speeds with a network whose shape evolves, by NEAT.
+    Graph,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Kind; 5] =
+        [Kind::Network, Kind::PhaseNetwork, Kind::Oscillator, Kind::OscillatorNetwork, Kind::Poses];
+
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Network => "network",
+            Kind::PhaseNetwork => "phase_network",
+            Kind::Oscillator => "oscillator",
+            Kind::OscillatorNetwork => "oscillator_network",
+            Kind::Poses => "poses",
+            Kind::Graph => "graph",
+        }
+    }
+
+    /// Whether it has a network, and so senses.
+    pub fn has_network(self) -> bool {
+        !matches!(self, Kind::Oscillator | Kind::Poses)
+    }
+
+    /// Whether it has an oscillator for each joint.
+    pub fn has_oscillators(self) -> bool {
+        matches!(self, Kind::Oscillator | Kind::OscillatorNetwork)
+    }
+}
+
 /// A controller's make; what is left out is as `version` has it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, expecting = "a table of settings")]
 pub struct Settings {
+    /// What it is made of; a network if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<Kind>,
+    /// Whether paired joints share their genes: in oscillators half a period apart, in poses alike. If
+    /// absent: with four legs and more; bipeds need both legs for themselves. A network shares
+    /// nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub share: Option<bool>,
     /// The seed's milestone to start from.
     pub version: Version,
     /// What it is told; as the creature's file says if absent, with foot contacts before 2.0.
@@ -68,7 +123,14 @@ impl Settings {
         let neurons = if self.version == Version::V2_0 { 10 } else { 8 };
         let activation = if early { Activation::Logistic } else { Activation::Tanh };
         let scaling = if early { Scaling::Degrees } else { Scaling::Three };
+        let kind = self.kind.unwrap_or(Kind::Network);
+        let share = match kind {
+            Kind::Poses | Kind::Oscillator | Kind::OscillatorNetwork => body.legs().len() >= 4,
+            Kind::Network | Kind::PhaseNetwork | Kind::Graph => false,
+        };
         Self {
+            kind: Some(kind),
+            share: Some(self.share.unwrap_or(share)),
             version: self.version,
             sensors: Some(sensors),
             hidden: Some(self.hidden.clone().unwrap_or_else(|| vec![neurons])),

@@ -58,6 +58,7 @@ fn pilot(body: &Body, settings: &Settings) -> Pilot {
 
 fn senses(body: &Body) -> Senses {
     Senses {
+        time: 0.0,
         torso_rotation: 0.3,
         joint_angles: (0..body.driven().len()).map(|i| 0.2 * i as f32 - 0.7).collect(),
         joint_speeds: (0..body.driven().len()).map(|i| 3.0 - i as f32).collect(),
@@ -88,7 +89,8 @@ fn inputs(body: &Body, settings: &Value, senses: &Senses) -> Vec<f32> {
         let pilot = Pilot::new(body, &settings, &genome).unwrap();
         let sum = steer(&pilot, senses)[0].atanh();
         // 2 (logistic(a) - 1/2) = tanh(a/2).
-        let half = if pilot.network().activation() == Activation::Logistic { 2.0 } else { 1.0 };
+        let half =
+            if pilot.network().unwrap().activation() == Activation::Logistic { 2.0 } else { 1.0 };
         half * sum / weight
     };
     (0..width).map(look).collect()
@@ -167,10 +169,10 @@ fn versions_are_the_milestones_of_the_seed() {
     for (at, widths, activation, scaling) in cases {
         assert_eq!(Pilot::widths(&tetrapod(), &version(at)).unwrap(), widths, "{at:?}");
         let pilot = pilot(&tetrapod(), &version(at));
-        assert_eq!(pilot.network().activation(), activation, "{at:?}");
+        assert_eq!(pilot.network().unwrap().activation(), activation, "{at:?}");
         assert_eq!(pilot.settings().scaling, Some(scaling), "{at:?}");
         let gain = if scaling == Scaling::Three { 3.0 } else { 1.0 };
-        assert_eq!(pilot.network().gain(), gain, "{at:?}");
+        assert_eq!(pilot.network().unwrap().gain(), gain, "{at:?}");
     }
     assert_eq!(Settings::default().version, Version::V2_0);
 }
@@ -180,8 +182,8 @@ fn settings_override_the_version_one_by_one() {
     let json = json!({"version": "1.0", "hidden": [5, 6], "activation": "cheap_tanh",
         "sensors": ["height", "joint_angles"]});
     let pilot = pilot(&tetrapod(), &settings(json));
-    assert_eq!(pilot.network().widths(), [9, 5, 6, 8]);
-    assert_eq!(pilot.network().activation(), Activation::CheapTanh);
+    assert_eq!(pilot.network().unwrap().widths(), [9, 5, 6, 8]);
+    assert_eq!(pilot.network().unwrap().activation(), Activation::CheapTanh);
     assert_eq!(pilot.settings().scaling, Some(Scaling::Degrees));
     assert_eq!(pilot.sensors(), [Sensor::Height, Sensor::JointAngles]);
     // With everything said, it is the same controller.
@@ -294,7 +296,7 @@ fn controllers_that_cannot_be_made_are_refused() {
     refused(json!({"hidden": [1, 1, 1, 1, 1, 1, 1, 1, 1]}), nine);
     let twice = json!({"sensors": ["foot_contacts", "height", "foot_contacts"]});
     refused(twice, "controller.sensors: foot_contacts is listed twice");
-    let nothing = "controller.sensors: nothing to sense or nothing to drive";
+    let nothing = "controller.sensors: nothing to sense";
     refused(json!({"sensors": []}), nothing);
     let rays = |count: u32, reach: f32| json!({"ground_rays": {"count": count, "reach": reach}});
     for (count, reach, shown) in [(0, 1.0, "1"), (17, 1.0, "1"), (3, 0.0, "0"), (3, 51.0, "51")] {
@@ -323,11 +325,11 @@ fn a_creature_without_legs_or_driven_joints_is_told_so() {
     let apod = Body::new(description.clone()).unwrap();
     assert_eq!(Pilot::widths(&apod, &version(Version::V1_0)).unwrap(), [3, 8, 2]);
     let feet = Settings { sensors: Some(vec![Sensor::FootContacts]), ..Settings::default() };
-    let nothing = PilotError::Sensors("nothing to sense or nothing to drive".into());
-    assert_eq!(Pilot::widths(&apod, &feet), Err(nothing.clone()));
+    let nothing = |what: &str| Err(PilotError::Sensors(format!("nothing to {what}")));
+    assert_eq!(Pilot::widths(&apod, &feet), nothing("sense"));
     description.parts[1..].iter_mut().for_each(|part| part.tags.push(ambulo_body::Tag::Ignored));
     let statue = Body::new(description).unwrap();
-    assert_eq!(Pilot::widths(&statue, &Settings::default()), Err(nothing));
+    assert_eq!(Pilot::widths(&statue, &Settings::default()), nothing("drive"));
 }
 
 #[test]
@@ -337,9 +339,9 @@ fn genomes_are_of_the_right_length_and_finite() {
     };
     let mut genes = genome(Pilot::genes(&biped(), &Settings::default()).unwrap());
     assert_eq!(genes.len(), (3 + 1) * 10 + (10 + 1) * 2);
-    assert_eq!(refused(&genes[1..]), "the genome: 'genome': expected 62 numbers, got 61");
+    assert_eq!(refused(&genes[1..]), "the genome: expected 62 numbers, got 61");
     genes[17] = f32::NAN;
-    assert!(refused(&genes).starts_with("the genome: 'genome': "), "{}", refused(&genes));
+    assert_eq!(refused(&genes), "the genome: number 17 is NaN, not finite");
 }
 
 fn words() -> BTreeMap<String, String> {
@@ -539,8 +541,8 @@ fn commands_are_the_same_bits_everywhere() {
         "velocity", {"ground_rays": {"count": 3, "reach": 2.0}}]);
     let golden = [
         (json!({"version": "1.0"}), [0xbe31_d06c, 0x3d8c_20b0]),
-        (json!({"version": "1.2"}), [0xbf2d_082c, 0x3ec3_9444]),
-        (json!({"version": "2.0"}), [0x3e22_8deb, 0x3e92_49cb]),
+        (json!({"version": "1.2"}), [0xbf2d_082e, 0x3ec3_9443]),
+        (json!({"version": "2.0"}), [0x3e22_8df0, 0x3e92_49cc]),
         (
             json!({"sensors": all, "hidden": [7, 5], "activation": "cheap_tanh"}),
             [0xbe70_31e8, 0xbef5_2804],
@@ -554,6 +556,6 @@ fn commands_are_the_same_bits_everywhere() {
         let pilot = Pilot::new(&biped(), &settings, &genome).unwrap();
         let commands = steer(&pilot, &senses(&biped()));
         let bits: Vec<_> = commands.iter().map(|command| command.to_bits()).collect();
-        assert_eq!(bits, expected, "{make}: {commands:?}");
+        assert_eq!(bits, expected, "{make}: {commands:?} {bits:x?}");
     }
 }

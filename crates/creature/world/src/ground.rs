@@ -35,6 +35,15 @@ pub enum Ground {
         /// From the end of one to the begin of the next, metres, 0.5 to 50.
         between: f32,
     },
+    /// Blocks to get over from 3 m on.
+    Hurdles {
+        /// Metres, 0.01 to 2.
+        height: f32,
+        /// How thick they are, metres, 0.02 to 5.
+        width: f32,
+        /// From the end of one to the begin of the next, metres, 0.5 to 50.
+        between: f32,
+    },
     /// Uneven from 3 m on.
     Rough {
         /// The most that a corner is off the level, metres, 0 to 1.
@@ -59,6 +68,11 @@ impl Ground {
             Ground::Holes { width, between } => {
                 vec![("ground.width", width, [0.05, 5.0]), ("ground.between", between, [0.5, 50.0])]
             }
+            Ground::Hurdles { height, width, between } => vec![
+                ("ground.height", height, [0.01, 2.0]),
+                ("ground.width", width, [0.02, 5.0]),
+                ("ground.between", between, [0.5, 50.0]),
+            ],
             Ground::Rough { height, spacing, .. } => {
                 vec![
                     ("ground.height", height, [0.0, 1.0]),
@@ -87,14 +101,9 @@ impl Ground {
                 }
                 points.push([REACH, count as f32 * height]);
             }
-            Ground::Holes { width, between } => {
-                let mut x = BEGIN;
-                while x + width < REACH {
-                    let end = x + width;
-                    points.extend([[x, 0.0], [x, -DEPTH], [end, -DEPTH], [end, 0.0]]);
-                    x = end + between;
-                }
-                points.push([REACH, 0.0]);
+            Ground::Holes { width, between } => blocks(&mut points, -DEPTH, width, between),
+            Ground::Hurdles { height, width, between } => {
+                blocks(&mut points, height, width, between);
             }
             Ground::Rough { height, spacing, seed } => {
                 points.push([BEGIN, 0.0]);
@@ -109,6 +118,17 @@ impl Ground {
         }
         Outline(points)
     }
+}
+
+/// Stretches of the same width that are so much higher than the rest.
+fn blocks(points: &mut Vec<[f32; 2]>, height: f32, width: f32, between: f32) {
+    let mut x = BEGIN;
+    while x + width < REACH {
+        let end = x + width;
+        points.extend([[x, 0.0], [x, height], [end, height], [end, 0.0]]);
+        x = end + between;
+    }
+    points.push([REACH, 0.0]);
 }
 
 /// Uniform in [-1, 1): SplitMix64 (Steele, Lea, Flood 2014).
@@ -158,6 +178,7 @@ mod tests {
             Ground::Slope { angle: 0.2 },
             Ground::Steps { height: 0.1, length: 0.5 },
             Ground::Holes { width: 0.4, between: 3.0 },
+            Ground::Hurdles { height: 0.2, width: 0.3, between: 2.0 },
             Ground::Rough { height: 0.2, spacing: 0.5, seed: 1 },
         ];
         for ground in kinds {
@@ -171,6 +192,9 @@ mod tests {
             (stair.height(3.7) - 0.2).abs() < 1e-5 && (stair.highest(2.0, 3.2) - 0.1).abs() < 1e-5
         );
         assert_eq!(Ground::Holes { width: 0.4, between: 3.0 }.outline().height(3.2), -DEPTH);
+        let hurdles = Ground::Hurdles { height: 0.2, width: 0.3, between: 2.0 }.outline();
+        assert!(hurdles.height(3.1) == 0.2 && hurdles.height(3.4) == 0.0);
+        assert!(hurdles.height(5.4) == 0.2, "the next one");
         let rough = |seed| Ground::Rough { height: 0.2, spacing: 0.5, seed }.outline();
         assert!(rough(1) == rough(1) && rough(1) != rough(2));
         assert!(rough(1).points().iter().all(|p| p[1].abs() <= 0.2));

@@ -3,12 +3,14 @@
 use std::collections::HashMap;
 
 use ambulo_body::{Body, Joint, Part};
+use ambulo_lanes::{Lanes, Mask, Scalar};
 use boxdd::{
     BodyBuilder, BodyId, BodyType, Filter, Foundation, JointId, ShapeDef, ShapeId, Snapshot,
     SurfaceMaterial, WorldBuilder, shapes,
 };
 
-use crate::{Outline, Physics, PhysicsError};
+use crate::physics::DEPTH;
+use crate::{Outline, Physics, PhysicsError, Stage};
 
 const GROUND: u64 = 1;
 const PARTS: u64 = 2;
@@ -44,8 +46,19 @@ pub struct World {
     start_angles: Vec<f32>,
     centres: Vec<[f32; 2]>,
     individuals: Vec<Individual>,
+    /// Of each part: cosine and sine of its frame in the start pose, how much water slows it along the
+    /// frame's axes and in turning, its mass and its moment of inertia. Nothing without water.
+    water: Vec<Wet>,
     /// Individual and part of every shape but the ground's.
     owners: HashMap<ShapeId, (usize, usize)>,
+}
+
+/// What water does to a part.
+struct Wet {
+    frame: [f32; 2],
+    drag: [f32; 3],
+    mass: f32,
+    inertia: f32,
 }
 
 /// One creature: its handles, and how it was after the last step.
@@ -91,7 +104,7 @@ impl World {
         assert!(count == 1 || !several, "one individual a world on such ground");
         let foundation = Foundation::initialize_default()?;
         let definition = WorldBuilder::from(foundation.world_def())
-            .gravity([0.0, -physics.gravity])
+            .gravity([0.0, -physics.weight()])
             // Sleep would reorder bodies; tunnelling through a ground of one line is harmless.
             .enable_sleep(false)
             .enable_continuous(false);
@@ -106,6 +119,10 @@ impl World {
             start_angles: body.parts().iter().map(|part| part.angle).collect(),
             centres: body.parts().iter().map(centre).collect(),
             ground,
+            water: match physics.water {
+                Some(_) => (0..body.parts().len()).map(|part| wet(body, part, physics)).collect(),
+                None => vec![],
+            },
             individuals: Vec::with_capacity(count),
             owners: HashMap::new(),
         };
@@ -122,7 +139,8 @@ impl World {
         physics: &Physics,
     ) -> Result<(), WorldError> {
         let [left, bottom, right, _] = body.bounds();
-        let lift = self.ground.highest(left, right) - bottom;
+        let depth = if physics.water.is_some() { DEPTH } else { 0.0 };
+        let lift = self.ground.highest(left, right) - bottom + depth;
         let filter = Filter { category_bits: PARTS, mask_bits: GROUND, group_index: -1 };
         let mut bodies = Vec::with_capacity(body.parts().len());
         let mut position = Vec::with_capacity(body.parts().len());
@@ -218,6 +236,7 @@ impl World {
     /// # Errors
     /// A state that is no longer finite.
     pub fn step(&mut self) -> Result<(), WorldError> {
+        self.wade()?;
         let done = self.engine.step(self.dt, self.substeps)?;
         let moved = done.body_events()?;
         // Nothing sleeps, so every part is told about, in the order in which all were made.
@@ -243,6 +262,27 @@ impl World {
             if let Some((individual, part)) = owner(&event.shape_a, &event.shape_b) {
                 let count = &mut self.individuals[individual].state.touching[part];
                 *count = count.saturating_sub(1);
+            }
+        }
+        Ok(())
+    }
+
+    /// Slows everything as water does in a step: implicitly, so that nothing turns back.
+    fn wade(&mut self) -> Result<(), WorldError> {
+        for individual in &self.individuals {
+            for (part, wet) in self.water.iter().enumerate() {
+                let [cos, sin] = individual.state.rotation[part];
+                let [fc, fs] = wet.frame;
+                let [c, s] = [cos * fc - sin * fs, sin * fc + cos * fs];
+                let mut body = self.engine.body(individual.bodies[part])?;
+                let velocity = body.linear_velocity()?;
+                let (vx, vy) = (velocity.x, velocity.y);
+                let w = body.angular_velocity()?;
+                let slowed = |v: f32, drag: f32, mass: f32| v / (1.0 + drag * v.abs() / mass);
+                let along = slowed(c * vx + s * vy, wet.drag[0], wet.mass);
+                let across = slowed(c * vy - s * vx, wet.drag[1], wet.mass);
+                body.set_linear_velocity([c * along - s * across, s * along + c * across])?;
+                body.set_angular_velocity(slowed(w, wet.drag[2], wet.inertia))?;
             }
         }
         Ok(())
@@ -328,12 +368,87 @@ impl World {
     }
 }
 
+/// Each individual is a group of one lane.
+impl Stage<Scalar> for World {
+    fn groups(&self) -> usize {
+        self.individuals()
+    }
+
+    fn dt(&self) -> Lanes<Scalar> {
+        self.dt.into()
+    }
+
+    fn ground(&self) -> &Outline {
+        &self.ground
+    }
+
+    fn set_motor(
+        &mut self,
+        group: usize,
+        joint: usize,
+        speed: Lanes<Scalar>,
+    ) -> Result<(), WorldError> {
+        World::set_motor(self, group, joint, speed.value())
+    }
+
+    fn step(&mut self) -> Result<(), WorldError> {
+        World::step(self)
+    }
+
+    fn centre(&self, group: usize, part: usize) -> [Lanes<Scalar>; 2] {
+        World::centre(self, group, part).map(Lanes::from)
+    }
+
+    fn turned(&self, group: usize, part: usize) -> Lanes<Scalar> {
+        World::turned(self, group, part).into()
+    }
+
+    fn joint_angle(&self, group: usize, joint: usize) -> Lanes<Scalar> {
+        World::joint_angle(self, group, joint).into()
+    }
+
+    fn touches(&self, group: usize, part: usize) -> Mask<Scalar> {
+        World::touches(self, group, part).into()
+    }
+
+    fn motor_torque(&mut self, group: usize, joint: usize) -> Result<Lanes<Scalar>, WorldError> {
+        World::motor_torque(self, group, joint).map(Lanes::from)
+    }
+
+    fn push(
+        &mut self,
+        group: usize,
+        part: usize,
+        change: [Lanes<Scalar>; 2],
+    ) -> Result<(), WorldError> {
+        World::push(self, group, part, change.map(Lanes::value))
+    }
+
+    fn pose(&self, group: usize, _: usize, part: usize) -> Pose {
+        World::pose(self, group, part)
+    }
+
+    fn hash(&self, group: usize, _: usize, hash: u64) -> u64 {
+        World::hash(self, group, hash)
+    }
+}
+
+fn wet(body: &Body, index: usize, physics: &Physics) -> Wet {
+    let part = &body.parts()[index];
+    Wet {
+        frame: turn([1.0, 0.0], part.angle),
+        drag: physics.drag(part.shape.extent()),
+        mass: body.part_mass(index) * physics.mass_scale,
+        inertia: part.density * physics.mass_scale * part.shape.second_moment(),
+    }
+}
+
 /// Centre of mass of a part in the frame that turns with it and was upright in the start pose.
 fn centre(part: &Part) -> [f32; 2] {
     turn(part.shape.centre(), part.angle)
 }
 
-fn turn([x, y]: [f32; 2], angle: f32) -> [f32; 2] {
+pub(crate) fn turn([x, y]: [f32; 2], angle: f32) -> [f32; 2] {
     let (sin, cos) = libm::sincosf(angle);
     [cos * x - sin * y, sin * x + cos * y]
 }

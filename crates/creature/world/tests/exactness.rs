@@ -82,7 +82,7 @@ fn golden_paths() {
     let stair = Ground::Steps { height: 0.05, length: 0.6 };
     let golden = [
         ("apod", Ground::Flat, "639381875af5f4c8"),
-        ("biped1", Ground::Flat, "10d6f76dc42dfd28"),
+        ("biped1", Ground::Flat, "5c3afefaaf545e39"),
         ("tetrapod2", Ground::Flat, "ce022443e236a1ae"),
         ("decapod2", Ground::Flat, "52be1ff5c034618e"),
         ("tetrapod2", hilly, "d82da25c33ac2d14"),

@@ -1,7 +1,7 @@
 //! Creatures and arenas that tests share.
 #![allow(dead_code)] // Each test file uses some of it.
 
-use ambulo_arena::{Arena, Settings};
+use ambulo_arena::{Arena, Evolution, Settings};
 use ambulo_body::Body;
 
 /// Names of all creatures that ship.
@@ -24,9 +24,16 @@ pub fn starter(name: &str) -> Body {
     Body::parse(&text).unwrap()
 }
 
-/// An arena with settings as JSON.
+/// An arena of the seed's protocol with settings as JSON.
 pub fn arena(name: &str, settings: &str) -> Arena {
-    Arena::new(starter(name), Settings::parse(settings).unwrap()).unwrap()
+    let mut settings: serde_json::Value = serde_json::from_str(settings).unwrap();
+    settings["preset"] = "seed".into();
+    Arena::new(starter(name), Settings::parse(&settings.to_string()).unwrap()).unwrap()
+}
+
+/// Genomes of an arena's first generation.
+pub fn first(arena: &Arena) -> Vec<Vec<f32>> {
+    Evolution::new(arena).unwrap().ask().to_vec()
 }
 
 /// An arena of a task with so many steps and a small population.
