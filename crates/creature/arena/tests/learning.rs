@@ -36,7 +36,7 @@ fn creatures_that_no_one_tuned_for_learn_to_run() {
 
 /// Half of its population falls in the first generation: an episode ends at a fall.
 const SMALL: &str = r#"{"seed": 5, "task": {"name": "run", "grow": [60, 120], "steps": 240},
-    "evolution": {"population": 20}, "search": {"trials": 5, "patience": 3}}"#;
+    "evolution": {"population": 20}, "search": {"trials": 5, "patience": 2}}"#;
 
 #[test]
 fn portions_bring_the_same_search_as_whole_generations() {
@@ -45,7 +45,7 @@ fn portions_bring_the_same_search_as_whole_generations() {
     let mut whole = Evolution::new(&whole_arena).unwrap();
     let mut learner = Learner::new(arena()).unwrap();
     let mut portions = 0;
-    for generation in 1..=8 {
+    for generation in 1..=12 {
         let expected = whole.step(&whole_arena, 2).unwrap();
         let told = loop {
             portions += 1;
