@@ -92,7 +92,10 @@ fn batch_of(trials: &[Trial<'_>], bench: Bench<'_>) -> Result<Vec<Option<Tally>>
         return Ok(vec![]);
     }
     if trials[0].physics.solver == Solver::Lockstep {
-        return bench.width.run(InLanes { trials, bench });
+        // What is left over is done soonest with as few lanes as hold it.
+        let fits = |width: &Width| width.lanes() >= trials.len() && *width <= bench.width;
+        let width = Width::available().find(fits).expect("a batch fits its lanes");
+        return width.run(InLanes { trials, bench });
     }
     let shared = trials.windows(2).all(|pair| pair[0].physics == pair[1].physics);
     let each_alone = || {
