@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -23,7 +24,7 @@ from ambulo._core import Arena
 from ambulo.creature import description, load_controller, load_creature, recorded
 from ambulo.evaluate.machine import machine
 from ambulo.evolution import Evolution, champion_at, read_history
-from ambulo.executors import on_threads
+from ambulo.executors import default_threads, on_threads
 from ambulo.files import write_atomic
 from ambulo.pictures.replay import gait_picture, strip_picture
 from ambulo.study.page import write_page
@@ -86,23 +87,32 @@ def evolve_all(
 ) -> bool:
     """Does every run that is not done yet; False if it was stopped.
 
-    Run after run through all cases, so that a study that is stopped has some of each. `watch` is
-    told what runs and how many generations of all are done.
+    As many runs at a time as `threads`, each on one: a generation of fifty is too few to share out
+    well. Seed after seed through all cases, so that a study that is stopped has some of each.
+    `watch` is told what runs and how many generations of all are done.
     """
-    done = 0
-    for seed in range(1, plan.runs + 1):
-        for creature, task in plan.cases:
-            folder = plan.run_folder(creature, task, seed)
-            run = _begun(plan, folder, creature, task, seed)
-            executor = on_threads(run.arena, threads)
-            name = f"{creature} {task} {seed}/{plan.runs}"
-            for _ in run.steps(executor, stop=stop):
-                watch(name, done + run.generation)
-            if run.generation < run.generations:
-                return False
-            done += run.generations
-            watch(name, done)
-    return True
+    cases = [
+        (creature, task, seed) for seed in range(1, plan.runs + 1) for creature, task in plan.cases
+    ]
+    done = dict.fromkeys(cases, 0)
+
+    def evolve(case: tuple[str, str, int]) -> bool:
+        creature, task, seed = case
+        if stop():
+            return False
+        run = _begun(plan, plan.run_folder(creature, task, seed), creature, task, seed)
+        executor, name = on_threads(run.arena, 1), f"{creature} {task} {seed}/{plan.runs}"
+        done[case] = run.generation
+        if run.generation >= run.generations:
+            watch(name, sum(done.values()))
+        for _ in run.steps(executor, threads=1, stop=stop):
+            done[case] = run.generation
+            watch(name, sum(done.values()))
+        return run.generation >= run.generations
+
+    # The slow part leaves the interpreter, so threads are enough.
+    with ThreadPoolExecutor(threads or default_threads()) as pool:
+        return all(list(pool.map(evolve, cases)))
 
 
 def _begun(plan: Plan, folder: Path, creature: str, task: str, seed: int) -> Evolution:
