@@ -5,6 +5,7 @@
     history.jsonl    a line a generation
     champions/       a controller for every improvement, by generation
     best.safetensors the newest of them
+    archive/         of MAP-Elites: a controller for every kind of motion, when the search ends
     checkpoint.json  everything that is needed to go on, renewed every quarter of a second
 
 Every file is written beside its place and renamed, and the checkpoint comes last: whatever happens,
@@ -328,6 +329,25 @@ class Evolution:
             json.dumps(provenance),
             json.dumps({"arena": self.settings, "record": record}),
         )
+
+    def write_archive(self) -> list[Path]:
+        """Of MAP-Elites: a controller for every kind of motion that it keeps, to choose from.
+
+        What an earlier call left is taken away.
+        """
+        place = self.folder / "archive"
+        for path in place.glob("cell-*.safetensors"):
+            path.unlink()
+        written = []
+        for cell, _, genome in self.search.archive():
+            place.mkdir(exist_ok=True)
+            fitness, terms = self.arena.score(genome)
+            elite = Champion(genome, fitness, self.generation, robustness=None, good=False)
+            path = place / f"cell-{'-'.join(map(str, cell))}.safetensors"
+            with replacing(path) as part:
+                part.write_bytes(self._controller(elite, terms))
+            written.append(path)
+        return written
 
     def _save(self) -> None:
         # The search's state is JSON as it comes.

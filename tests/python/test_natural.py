@@ -297,3 +297,16 @@ def test_every_controller_is_evolved_and_drives(
         controller.drive(0.0, [0.0, 0.0, 0.0])
     report = said(ambulo("replay", folder, "-o", tmp_path / "r", *SHORT, "--steps", 120))
     assert report["fitness"] == report["recorded_fitness"] == saved.record["fitness"]
+
+
+def test_map_elites_leaves_an_archive_of_different_motions(tmp_path: Path, evolve: Evolve) -> None:
+    folder = tmp_path / "run"
+    report = evolve(folder, "--strategy", "map_elites", "--generations", 6)
+    files = sorted((folder / "archive").glob("cell-*.safetensors"))
+    assert report["archive"] == len(files) > 1
+    for path in files:
+        saved = load_controller(path)
+        arena = Arena(saved.creature, json.dumps(saved.settings))
+        assert arena.score(saved.genome)[0] == saved.record["fitness"], path.name
+    genomes = {load_controller(path).genome.tobytes() for path in files}
+    assert len(genomes) == len(files)

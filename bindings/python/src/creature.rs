@@ -318,6 +318,9 @@ pub struct Search {
     search: arena::Evolution,
 }
 
+/// Place among kinds of motions, fitness, genome.
+type Elite<'py> = (Vec<usize>, f64, Bound<'py, PyArray1<f32>>);
+
 fn told<'py>(py: Python<'py>, told: arena::Told) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("best", told.best)?;
@@ -412,6 +415,14 @@ impl Search {
         dict.set_item("robustness", found)?;
         dict.set_item("good", champion.good)?;
         Ok(Some(dict))
+    }
+
+    /// Different motions to choose from, of MAP-Elites: place among kinds, fitness and genome of each.
+    fn archive<'py>(&self, py: Python<'py>) -> Vec<Elite<'py>> {
+        let elite = |(cell, fitness, genome): (&[usize], f64, &[f32])| {
+            (cell.to_vec(), fitness, genome.to_vec().into_pyarray(py))
+        };
+        self.search.archive().into_iter().map(elite).collect()
     }
 
     /// Whether the champion is `usable`, `robust` or `good` (and robust).

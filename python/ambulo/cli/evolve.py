@@ -164,7 +164,8 @@ def evolve(
             show(done)
         reached = None if until is None else run.search.has(until)
         stopped = asked_to_stop() and run.generation < run.generations and not reached
-    _report(run, began, until, reached, as_json)
+    archive = run.write_archive()
+    _report(run, began, until, reached, len(archive), as_json)
     if stopped:
         click.echo(f"stopped after generation {run.generation}; --resume goes on", err=True)
         raise click.exceptions.Exit(STOPPED)
@@ -329,7 +330,7 @@ def _verdict(champion: Champion) -> str | None:
 
 
 def _report(
-    run: Evolution, began: int, until: str | None, reached: bool | None, as_json: bool
+    run: Evolution, began: int, until: str | None, reached: bool | None, kinds: int, as_json: bool
 ) -> None:
     best = run.champion
     report = {
@@ -346,6 +347,7 @@ def _report(
         "robustness": best and best.robustness,
         "good": None if best is None or best.robustness is None else best.good,
         "reached": reached,
+        "archive": kinds or None,
         "seconds": round(run.seconds, 3),
     }
     if as_json:
@@ -365,4 +367,6 @@ def _report(
             f"{'' if reached else 'not yet '}{until} after {run.generation} of at most "
             f"{run.generations} generations"
         )
+    if kinds:
+        click.echo(f"{kinds} kinds of motion to choose from: {run.folder / 'archive'}")
     click.echo(f"watch it: ambulo replay {run.folder} -o {run.folder / 'replay'}")

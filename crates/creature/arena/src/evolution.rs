@@ -146,6 +146,15 @@ impl Evolution {
         self.champion.as_ref()
     }
 
+    /// Different motions to choose from, best fitness of each kind: its place among kinds, fitness and
+    /// genome. Only MAP-Elites keeps them.
+    pub fn archive(&self) -> Vec<(&[usize], f64, &[f32])> {
+        match &self.strategy {
+            Search::MapElites(search) => search.archive().collect(),
+            _ => vec![],
+        }
+    }
+
     /// The genomes whose fitness it wants to know.
     pub fn ask(&self) -> &[Vec<f32>] {
         self.strategy.ask()
@@ -220,7 +229,9 @@ impl Evolution {
             (self.best, self.best_at) = (None, self.generation);
         }
         let patience = arena.settings().search.patience.expect("resolved");
-        let restarted = patience > 0 && self.generation - self.best_at >= patience;
+        // An archive is what MAP-Elites is for: it is not thrown away.
+        let keeps = matches!(self.strategy, Search::MapElites(_));
+        let restarted = !keeps && patience > 0 && self.generation - self.best_at >= patience;
         if restarted {
             self.restarts += 1;
             let seed = arena.settings().seed ^ self.restarts.wrapping_mul(0x9E37_79B9_7F4A_7C15);
