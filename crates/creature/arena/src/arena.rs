@@ -19,6 +19,8 @@ const QUICKEST: f64 = 8.0;
 /// Replays with pushes, and how many of them a robust motion gets through.
 const PUSHED: u64 = 16;
 const PUSHED_WELL: usize = 15;
+/// Replays of a genome under all physics that a robust motion gets through.
+pub(crate) const WAYS: usize = 5 + PUSHED as usize;
 /// Seed of the pushes of tasks that push.
 pub(crate) const FIRST_PUSHES: u64 = 1000;
 
@@ -237,7 +239,7 @@ impl Arena {
                 pushes: usable[5..].iter().filter(|&&usable| usable).count(),
             }
         };
-        tallies.chunks(5 + PUSHED as usize).map(of).collect()
+        tallies.chunks(WAYS).map(of).collect()
     }
 
     /// Natural fitness, and whether the motion is usable; NaN and no if it came to nothing that is a

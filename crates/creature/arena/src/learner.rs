@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crate::arena::WAYS;
 use crate::episode::Plan;
 use crate::evolution::Finalists;
 use crate::meter::Tally;
@@ -24,6 +25,8 @@ struct Work {
     chore: Chore,
     /// Individuals to be tried, how they are told apart by the chore, and what came of them.
     genomes: Vec<Vec<f32>>,
+    /// How many trials they come to.
+    trials: usize,
     found: Vec<Option<Tally>>,
     flight: Option<Flight>,
 }
@@ -124,27 +127,23 @@ impl Learner {
 
     /// Some steps of the batch at hand; whether all batches are done.
     fn advance(&self, work: &mut Work) -> Result<bool, ArenaError> {
-        let (under_way, done) = (work.flight.take(), work.found.len());
-        let (trials, plan) = self.trials(work);
-        if done >= trials.len() {
+        let done = work.found.len();
+        if done >= work.trials {
             return Ok(true);
         }
-        let batch = done..(done + self.arena.width().lanes()).min(trials.len());
-        let mut flight = match under_way {
+        let mut flight = match work.flight.take() {
             Some(flight) => flight,
-            None => Flight::new(&trials[batch], self.arena.bench(plan, 1))?,
+            None => {
+                let (trials, plan) = self.trials(work);
+                let batch = done..(done + self.arena.width().lanes()).min(trials.len());
+                Flight::new(&trials[batch], self.arena.bench(plan, 1))?
+            }
         };
         match flight.advance(PORTION)? {
-            Some(found) => {
-                let many = trials.len();
-                work.found.extend(found);
-                Ok(work.found.len() >= many)
-            }
-            None => {
-                work.flight = Some(flight);
-                Ok(false)
-            }
+            Some(found) => work.found.extend(found),
+            None => work.flight = Some(flight),
         }
+        Ok(work.found.len() >= work.trials)
     }
 
     fn trials<'a>(&'a self, work: &'a Work) -> (Vec<Trial<'a>>, Plan) {
@@ -161,6 +160,8 @@ impl Learner {
 
 impl Work {
     fn new(chore: Chore, genomes: Vec<Vec<f32>>) -> Self {
-        Self { chore, genomes, found: Vec::new(), flight: None }
+        let ways = if matches!(chore, Chore::Variations(..)) { WAYS } else { 1 };
+        let trials = ways * genomes.len();
+        Self { chore, genomes, trials, found: Vec::new(), flight: None }
     }
 }

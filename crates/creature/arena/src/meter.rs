@@ -350,6 +350,11 @@ impl Tally {
         (self.marks[4] - self.marks[0]) / (lead * self.dt)
     }
 
+    /// Mean power of the motors, |torque · speed|, watts.
+    pub fn power(&self) -> f64 {
+        self.work / (self.lived.max(1.0) * self.dt)
+    }
+
     /// Share of the episode before a fall.
     pub fn alive(&self) -> f64 {
         self.lived / self.steps.max(1.0)

@@ -1,11 +1,9 @@
 //! Climb: up a slope or a stair.
 
 use ambulo_body::Body;
-use ambulo_pilot::Kind;
 use ambulo_world::{Ground, Physics};
 
 use super::{Run, Task, on};
-use crate::Term;
 use crate::meter::Tally;
 
 /// Up, on foot.
@@ -20,34 +18,9 @@ impl Task for Climb {
         "get up a stair or a slope"
     }
 
-    fn steps(&self) -> u32 {
-        Run.steps()
-    }
-
-    fn weights(&self) -> &'static [(Term, f64)] {
-        Run.weights()
-    }
-
-    fn natural_steps(&self) -> u32 {
-        Run.natural_steps()
-    }
-
     /// Not too short: the ground is level for the first three metres.
     fn grow(&self) -> &'static [u32] {
         &[500, 1000]
-    }
-
-    fn falls(&self) -> bool {
-        true
-    }
-
-    fn controller(&self) -> Kind {
-        Kind::Oscillator
-    }
-
-    /// As a run, but for the ground.
-    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
-        Run.natural(tally, body, gravity)
     }
 
     /// A stair of low steps, unless a slope or another stair is asked for.

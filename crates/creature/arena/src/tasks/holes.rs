@@ -4,8 +4,7 @@ use ambulo_body::{Body, Sensor};
 use ambulo_pilot::Kind;
 use ambulo_world::{Ground, Physics};
 
-use super::{Run, Task, on, seeing};
-use crate::Term;
+use super::{Task, on, run_past, seeing};
 use crate::meter::Tally;
 
 /// Behind the third hole, metres from the start.
@@ -23,34 +22,13 @@ impl Task for Holes {
         "get over holes in the ground"
     }
 
-    fn steps(&self) -> u32 {
-        Run.steps()
-    }
-
-    fn weights(&self) -> &'static [(Term, f64)] {
-        Run.weights()
-    }
-
-    fn natural_steps(&self) -> u32 {
-        Run.natural_steps()
-    }
-
     /// Not too short: the ground is level for the first three metres.
     fn grow(&self) -> &'static [u32] {
         &[500, 1000]
     }
 
-    fn falls(&self) -> bool {
-        true
-    }
-
     fn controller(&self) -> Kind {
         Kind::OscillatorNetwork
-    }
-
-    /// As a run, but for the ground.
-    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
-        Run.natural(tally, body, gravity)
     }
 
     /// Narrow gaps, unless other ground is asked for.
@@ -64,11 +42,6 @@ impl Task for Holes {
 
     /// A usable run that has got past at least three of them.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String> {
-        let mut reasons = Run.reasons(tally, body);
-        let distance = tally.distance();
-        if distance <= THIRD {
-            reasons.push(format!("it got {distance:.1} m far, {THIRD:.1} are needed"));
-        }
-        reasons
+        run_past(THIRD, tally, body)
     }
 }

@@ -51,7 +51,7 @@ impl Task for KeepUpright {
     /// power.
     fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
         let length = f64::from(body.length());
-        let power = tally.work / (tally.lived.max(1.0) * tally.dt);
+        let power = tally.power();
         let weight = f64::from(body.mass()) * gravity.max(1e-3);
         let drift = 1.0 + 0.2 * tally.distance().abs() / length;
         tally.alive() * (1.0 - 0.5 * tally.mean_tilt) / drift - 0.05 * power / (weight * length)

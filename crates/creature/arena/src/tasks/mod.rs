@@ -15,6 +15,7 @@ use ambulo_pilot::Kind;
 use ambulo_world::{Ground, Physics};
 
 use crate::meter::Tally;
+use crate::settings::JUDGED;
 use crate::{ArenaError, Term};
 
 pub use climb::Climb;
@@ -26,26 +27,38 @@ pub use rough::Rough;
 pub use run::Run;
 pub use swim::Swim;
 
-/// Something that a creature shall learn.
+/// Something that a creature shall learn. What a task does not say is as for a run.
 pub trait Task: Sync {
     /// What it is called.
     fn name(&self) -> &'static str;
     /// What is asked for, in a line.
     fn about(&self) -> &'static str;
     /// Physics steps of an episode in the seed's protocol.
-    fn steps(&self) -> u32;
+    fn steps(&self) -> u32 {
+        2000
+    }
     /// What counts in the seed's protocol, and how much.
-    fn weights(&self) -> &'static [(Term, f64)];
+    fn weights(&self) -> &'static [(Term, f64)] {
+        &[(Term::Distance, 1.0)]
+    }
     /// Physics steps of an episode otherwise, and of the first, shorter ones.
-    fn natural_steps(&self) -> u32;
+    fn natural_steps(&self) -> u32 {
+        JUDGED
+    }
     /// See there.
     fn grow(&self) -> &'static [u32];
     /// Whether an episode ends at a fall.
-    fn falls(&self) -> bool;
+    fn falls(&self) -> bool {
+        true
+    }
     /// The kind of controller that learns it soonest.
-    fn controller(&self) -> Kind;
+    fn controller(&self) -> Kind {
+        Kind::Oscillator
+    }
     /// How well it is done the way a creature would do it: about 1 and more is good.
-    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64;
+    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
+        run::natural(tally, body, gravity)
+    }
     /// The laws of its world, from those that were asked for: the ground is the task's own where only
     /// level ground was asked for.
     fn world(&self, asked: Physics) -> Physics {
@@ -77,6 +90,16 @@ fn on(ground: Ground, asked: Physics) -> Physics {
         Ground::Flat => Physics { ground, ..asked },
         _ => asked,
     }
+}
+
+/// Why a motion is no usable run that has got so far, metres from the start.
+fn run_past(needed: f64, tally: &Tally, body: &Body) -> Vec<String> {
+    let mut reasons = Run.reasons(tally, body);
+    let distance = tally.distance();
+    if distance <= needed {
+        reasons.push(format!("it got {distance:.1} m far, {needed:.1} are needed"));
+    }
+    reasons
 }
 
 /// Posture, contacts and the ground ahead, for those who must see what comes.

@@ -1,11 +1,9 @@
 //! Rough: over uneven ground.
 
 use ambulo_body::Body;
-use ambulo_pilot::Kind;
 use ambulo_world::{Ground, Physics};
 
-use super::{Run, Task, on};
-use crate::Term;
+use super::{Task, on, run_past};
 use crate::meter::Tally;
 
 /// Well over where it begins to be uneven, metres from the start.
@@ -23,34 +21,9 @@ impl Task for Rough {
         "run over uneven ground"
     }
 
-    fn steps(&self) -> u32 {
-        Run.steps()
-    }
-
-    fn weights(&self) -> &'static [(Term, f64)] {
-        Run.weights()
-    }
-
-    fn natural_steps(&self) -> u32 {
-        Run.natural_steps()
-    }
-
     /// Not too short: the ground is level for the first three metres.
     fn grow(&self) -> &'static [u32] {
         &[500, 1000]
-    }
-
-    fn falls(&self) -> bool {
-        true
-    }
-
-    fn controller(&self) -> Kind {
-        Kind::Oscillator
-    }
-
-    /// As a run, but for the ground.
-    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
-        Run.natural(tally, body, gravity)
     }
 
     /// Bumps as high as a foot is thick, unless other ground is asked for.
@@ -60,11 +33,6 @@ impl Task for Rough {
 
     /// As a run, and beyond the level start.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String> {
-        let mut reasons = Run.reasons(tally, body);
-        let distance = tally.distance();
-        if distance <= BEYOND {
-            reasons.push(format!("it got {distance:.1} m far, {BEYOND:.1} are needed"));
-        }
-        reasons
+        run_past(BEYOND, tally, body)
     }
 }

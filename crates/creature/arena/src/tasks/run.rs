@@ -1,13 +1,10 @@
 //! Run: as far forward as possible (the seed, section 4.2.2).
 
 use ambulo_body::Body;
-use ambulo_pilot::Kind;
 
 use super::Task;
-use crate::Term;
 use crate::judge::{idle, posture};
 use crate::meter::Tally;
-use crate::settings::JUDGED;
 use crate::terms::mean;
 
 /// Forward, as far as possible.
@@ -22,47 +19,8 @@ impl Task for Run {
         "move forward, as far as possible"
     }
 
-    fn steps(&self) -> u32 {
-        2000
-    }
-
-    fn weights(&self) -> &'static [(Term, f64)] {
-        &[(Term::Distance, 1.0)]
-    }
-
-    fn natural_steps(&self) -> u32 {
-        JUDGED
-    }
-
     fn grow(&self) -> &'static [u32] {
         &[300, 600, 1000]
-    }
-
-    fn falls(&self) -> bool {
-        true
-    }
-
-    fn controller(&self) -> Kind {
-        Kind::Oscillator
-    }
-
-    /// Speed up to where more of it would make the gait brittle, with every leg at work, upright, to
-    /// the end, without waste:
-    /// 1.5 tanh(v/1.5) (0.2 + 0.5 mean u + 0.3 min u) (1 − 0.3 mean|tilt|) + 0.2 alive − c P/(m g L),
-    /// v in body lengths a second, u the use of each leg, P the motors' power. c is 0.05, and 0.02
-    /// for creatures without legs, which would rather lie still than pay more.
-    fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
-        let length = f64::from(body.length());
-        let speed = tally.speed() / length;
-        let uses = tally.uses(body);
-        let least = uses.iter().copied().fold(1.0, f64::min);
-        let legs = 0.2 + 0.5 * mean(&uses) + 0.3 * least;
-        let straight = 1.0 - 0.3 * tally.mean_tilt;
-        let power = tally.work / (tally.lived.max(1.0) * tally.dt);
-        let weight = f64::from(body.mass()) * gravity.max(1e-3);
-        let price = if body.legs().is_empty() { 0.02 } else { 0.05 };
-        1.5 * libm::tanh(speed / 1.5) * legs * straight + 0.2 * tally.alive()
-            - price * power / (weight * length)
     }
 
     /// Steady speed, upright, on its legs, all of them.
@@ -86,4 +44,23 @@ impl Task for Run {
         reasons.extend(idle(tally, body));
         reasons
     }
+}
+
+/// Speed up to where more of it would make the gait brittle, with every leg at work, upright, to
+/// the end, without waste:
+/// 1.5 tanh(v/1.5) (0.2 + 0.5 mean u + 0.3 min u) (1 − 0.3 mean|tilt|) + 0.2 alive − c P/(m g L),
+/// v in body lengths a second, u the use of each leg, P the motors' power. c is 0.05, and 0.02
+/// for creatures without legs, which would rather lie still than pay more.
+pub(super) fn natural(tally: &Tally, body: &Body, gravity: f64) -> f64 {
+    let length = f64::from(body.length());
+    let speed = tally.speed() / length;
+    let uses = tally.uses(body);
+    let least = uses.iter().copied().fold(1.0, f64::min);
+    let legs = 0.2 + 0.5 * mean(&uses) + 0.3 * least;
+    let straight = 1.0 - 0.3 * tally.mean_tilt;
+    let power = tally.power();
+    let weight = f64::from(body.mass()) * gravity.max(1e-3);
+    let price = if body.legs().is_empty() { 0.02 } else { 0.05 };
+    1.5 * libm::tanh(speed / 1.5) * legs * straight + 0.2 * tally.alive()
+        - price * power / (weight * length)
 }

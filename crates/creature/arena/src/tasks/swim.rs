@@ -1,14 +1,11 @@
 //! Swim: forward, in water.
 
 use ambulo_body::Body;
-use ambulo_pilot::Kind;
 use ambulo_world::Physics;
 
-use super::{Run, Task};
-use crate::Term;
+use super::Task;
 use crate::judge::still;
 use crate::meter::Tally;
-use crate::settings::JUDGED;
 use crate::terms::mean;
 
 /// The least speed of a usable swimmer, body lengths a second.
@@ -26,18 +23,6 @@ impl Task for Swim {
         "swim forward in water"
     }
 
-    fn steps(&self) -> u32 {
-        Run.steps()
-    }
-
-    fn weights(&self) -> &'static [(Term, f64)] {
-        Run.weights()
-    }
-
-    fn natural_steps(&self) -> u32 {
-        JUDGED
-    }
-
     /// Water is slow.
     fn grow(&self) -> &'static [u32] {
         &[500]
@@ -47,16 +32,12 @@ impl Task for Swim {
         false
     }
 
-    fn controller(&self) -> Kind {
-        Kind::Oscillator
-    }
-
     /// 1.5 tanh(v/1.5) (0.2 + 0.8 mean u) (1 − 0.3 mean|tilt|) − 0.01 P/(m g L), v in body lengths a
     /// second, u = min(1, sd/0.2) of each joint, P the motors' power.
     fn natural(&self, tally: &Tally, body: &Body, gravity: f64) -> f64 {
         let length = f64::from(body.length());
         let uses: Vec<_> = tally.deviation.iter().map(|sd| (sd / 0.2).min(1.0)).collect();
-        let power = tally.work / (tally.lived.max(1.0) * tally.dt);
+        let power = tally.power();
         let weight = f64::from(body.mass()) * gravity.max(1e-3);
         let speed = tally.speed() / length;
         let straight = (1.0 - 0.3 * tally.mean_tilt).max(0.0);
