@@ -6,11 +6,10 @@
     champions/       a controller for every improvement, by generation
     best.safetensors the newest of them
     archive/         of MAP-Elites: a controller for every kind of motion, when the search ends
-    checkpoint.json  everything that is needed to go on, renewed every quarter of a second
+    checkpoint.json  everything that is needed to go on, renewed every generation
 
 Every file is written beside its place and renamed, and the checkpoint comes last: whatever happens,
-the folder can go on from it, at most the generation at hand and a quarter of a second are lost, and
-it comes out the same.
+the folder can go on from it, at most the generation at hand is lost, and it comes out the same.
 """
 
 from __future__ import annotations
@@ -33,8 +32,6 @@ from ambulo.executors import Executor, default_threads
 from ambulo.files import replacing
 
 FORMAT = 2
-SAVE_EVERY = 0.25
-"""Seconds between two checkpoints, at least."""
 LICENCE = "the weights are their owner's: evolved from physics alone, no data behind them"
 
 
@@ -92,7 +89,6 @@ class Evolution:
         self.settings: dict[str, Any] = json.loads(arena.settings())
         self.search: Search = arena.search()
         self.seconds = 0.0
-        self._saved, self._saved_generation = -np.inf, 0
         self._resumed: dict[str, Any] | None = None
         """What `run.json` says from the next step on, of a run that was resumed and not yet gone on
         with."""
@@ -187,9 +183,7 @@ class Evolution:
 
     # -- searching ---------------------------------------------------------------------------
 
-    def step(
-        self, executor: Executor, threads: int | None = None, *, save: bool = True
-    ) -> Generation:
+    def step(self, executor: Executor, threads: int | None = None) -> Generation:
         """One generation: tries it, notes how it did, saves everything.
 
         `threads`: of the replays that champions are chosen on; all processors by default.
@@ -224,8 +218,7 @@ class Evolution:
         line["seconds"] = round(self.seconds, 3)
         with (self.folder / "history.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
-        if save:
-            self._save()
+        self._save()
         return Generation(
             generation=self.generation,
             best=told["best"],
@@ -268,18 +261,12 @@ class Evolution:
         """
         self._go_on()
         end = None if minutes is None else time.perf_counter() + 60.0 * minutes
-        try:
-            while self.generation < self.generations and not stop():
-                if until is not None and self.search.has(until):
-                    break
-                # A generation may take no longer than writing all of it down.
-                late = time.perf_counter() - self._saved >= SAVE_EVERY
-                yield self.step(executor, threads, save=late)
-                if end is not None and time.perf_counter() >= end:
-                    break
-        finally:
-            if self.generation > self._saved_generation:
-                self._save()
+        while self.generation < self.generations and not stop():
+            if until is not None and self.search.has(until):
+                break
+            yield self.step(executor, threads)
+            if end is not None and time.perf_counter() >= end:
+                break
 
     def _check(
         self,
@@ -353,7 +340,6 @@ class Evolution:
         # The search's state is JSON as it comes.
         held = f'{{"search": {self.search.state()}, "seconds": {self.seconds!r}}}'
         _write(self.folder / "checkpoint.json", held)
-        self._saved, self._saved_generation = time.perf_counter(), self.generation
 
     def _forget(self, after: int) -> None:
         """Champions of later generations, which will come again, and what was half written."""
