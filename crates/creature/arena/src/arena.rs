@@ -1,7 +1,9 @@
 //! Fitness of genomes, on all cores.
 
-use ambulo_body::Body;
-use ambulo_evolve::{EvolveError, StrategySettings};
+use std::sync::Arc;
+
+use ambulo_body::{Body, BodyError};
+use ambulo_evolve::{EvolveError, Random, StrategySettings};
 use ambulo_lanes::Width;
 use ambulo_pilot::{Pilot, PilotError};
 use ambulo_world::{Physics, World, WorldError};
@@ -11,8 +13,8 @@ use crate::judge::judge;
 use crate::meter::Tally;
 use crate::record::{Rollout, record};
 use crate::terms::{Term, Terms, mean};
-use crate::trials::{Bench, Trial, tried};
-use crate::{Judgement, Settings, Task};
+use crate::trials::{Bench, Individual, Trial, tried};
+use crate::{Judgement, Lesson, Round, Settings, Task};
 
 /// Motor reversals of a joint that count as the quickest kind of motion, a second.
 const QUICKEST: f64 = 8.0;
@@ -36,6 +38,12 @@ pub enum ArenaError {
     Evolve(#[from] EvolveError),
     #[error("world.{0}")]
     World(#[from] WorldError),
+    #[error("curriculum[{index}]: {source}")]
+    Lesson { index: usize, source: Box<ArenaError> },
+    #[error("a genome's numbers for the body: {expected} that are finite are expected")]
+    Genome { expected: usize },
+    #[error("the body that a genome means: {0}")]
+    Body(#[from] BodyError),
 }
 
 /// How a genome did.
@@ -82,10 +90,13 @@ impl Robustness {
 
 /// A body, a kind of controller, a world and a task.
 pub struct Arena {
-    body: Body,
+    body: Arc<Body>,
     settings: Settings,
     task: &'static dyn Task,
-    genes: usize,
+    /// Of its lessons, in their order.
+    lessons: Vec<Arena>,
+    /// Numbers of a genome that are the controller's, and that are the body's.
+    genes: [usize; 2],
     width: Width,
 }
 
@@ -97,10 +108,18 @@ impl Arena {
     pub fn new(body: Body, settings: Settings) -> Result<Self, ArenaError> {
         let (task, settings) = settings.resolved(&body)?;
         settings.world.check().map_err(WorldError::from)?;
-        let genes = Pilot::genes(&body, &settings.controller)?;
+        let evolving = settings.body.as_ref().map_or(0, |morphology| morphology.genes(&body));
+        let genes = [Pilot::genes(&body, &settings.controller)?, evolving];
         // The engine has the last word on shapes.
         World::new(&body, &settings.world, 1)?;
-        let arena = Self { body, settings, task, genes, width: Width::widest() };
+        let lesson = |(index, lesson): (usize, &Lesson)| {
+            let arena = Arena::new(body.clone(), lesson.settings(&settings));
+            arena.map_err(|source| ArenaError::Lesson { index, source: Box::new(source) })
+        };
+        let lessons =
+            settings.curriculum.iter().enumerate().map(lesson).collect::<Result<_, _>>()?;
+        let body = Arc::new(body);
+        let arena = Self { body, settings, task, lessons, genes, width: Width::widest() };
         arena.strategy().check()?;
         Ok(arena)
     }
@@ -112,7 +131,8 @@ impl Arena {
     /// This machine has not so many.
     pub fn with_width(self, width: Width) -> Self {
         assert!(width.is_available(), "this machine has not so many lanes");
-        Self { width, ..self }
+        let lessons = self.lessons.into_iter().map(|lesson| lesson.with_width(width)).collect();
+        Self { width, lessons, ..self }
     }
 
     /// How many lanes it uses.
@@ -120,9 +140,22 @@ impl Arena {
         self.width
     }
 
-    /// The creature.
+    /// The creature, as its file has it.
     pub fn body(&self) -> &Body {
         &self.body
+    }
+
+    /// How many lessons come before the task.
+    pub fn lessons(&self) -> usize {
+        self.lessons.len()
+    }
+
+    /// Where it is learned when so many lessons are ahead of the task.
+    ///
+    /// # Panics
+    /// There are not so many.
+    pub fn ahead(&self, lessons: usize) -> &Arena {
+        if lessons == 0 { self } else { &self.lessons[self.lessons.len() - lessons] }
     }
 
     /// Its settings, with everything said.
@@ -137,7 +170,7 @@ impl Arena {
 
     /// How many numbers a genome has; of networks that grow, the least.
     pub fn genes(&self) -> usize {
-        self.genes
+        self.genes.iter().sum()
     }
 
     /// The strategy.
@@ -150,7 +183,35 @@ impl Arena {
     /// # Errors
     /// A genome of another length, or not finite.
     pub fn pilot(&self, genome: &[f32]) -> Result<Pilot, ArenaError> {
-        Ok(Pilot::new(&self.body, &self.settings.controller, genome)?)
+        let individual = self.individual(genome)?;
+        Ok(Pilot::new(&individual.body, &self.settings.controller, individual.genes())?)
+    }
+
+    /// The body that a genome means: the creature, or where bodies evolve one with other measures.
+    ///
+    /// # Errors
+    /// As [`Arena::pilot`].
+    pub fn body_of(&self, genome: &[f32]) -> Result<Arc<Body>, ArenaError> {
+        Ok(self.individual(genome)?.body)
+    }
+
+    /// A genome with its body.
+    pub(crate) fn individual(&self, genome: &[f32]) -> Result<Individual, ArenaError> {
+        let expected = self.genes[1];
+        let steering = genome.len().saturating_sub(expected);
+        let genes = &genome[steering..];
+        if genes.len() != expected || genes.iter().any(|gene| !gene.is_finite()) {
+            return Err(ArenaError::Genome { expected });
+        }
+        let body = match &self.settings.body {
+            Some(morphology) => Arc::new(morphology.apply(&self.body, genes)?),
+            None => self.body.clone(),
+        };
+        Ok(Individual { genome: genome.to_vec(), steering, body })
+    }
+
+    pub(crate) fn individuals(&self, genomes: &[Vec<f32>]) -> Result<Vec<Individual>, ArenaError> {
+        genomes.iter().map(|genome| self.individual(genome)).collect()
     }
 
     /// The fitness of each genome in episodes of so many steps, on so many threads. Depends on the
@@ -164,8 +225,29 @@ impl Arena {
         steps: u32,
         threads: usize,
     ) -> Result<Vec<Score>, ArenaError> {
-        let (_, wanted) = self.fitness_plan(steps);
-        self.scores(genomes, steps, threads, &wanted)
+        self.try_round(genomes, Round { ahead: 0, steps, draw: None }, threads)
+    }
+
+    /// The fitness of each genome in a round of a search, on so many threads. Depends on genome and
+    /// round alone.
+    ///
+    /// # Errors
+    /// As [`Arena::evaluate`]; a round of more lessons than there are.
+    pub fn try_round(
+        &self,
+        genomes: &[Vec<f32>],
+        round: Round,
+        threads: usize,
+    ) -> Result<Vec<Score>, ArenaError> {
+        if round.ahead > self.lessons.len() {
+            let (ahead, lessons) = (round.ahead, self.lessons.len());
+            return Err(ArenaError::Settings(format!("{ahead} lessons ahead, of {lessons}")));
+        }
+        let arena = self.ahead(round.ahead);
+        let individuals = arena.individuals(genomes)?;
+        let trials = arena.of_round(&individuals, round);
+        let tallies = tried(&trials, arena.bench(arena.round_plan(round), threads))?;
+        Ok(arena.round_scores(&individuals, &tallies))
     }
 
     /// One genome in an episode of full length, with all terms measured, whether they count or not.
@@ -173,8 +255,11 @@ impl Arena {
     /// # Errors
     /// As [`Arena::evaluate`].
     pub fn score(&self, genome: &[f32]) -> Result<Score, ArenaError> {
-        let mut scores = self.scores(&[genome.to_vec()], self.steps(), 1, &Term::ALL)?;
-        Ok(scores.remove(0))
+        let individual = self.individual(genome)?;
+        let individuals = std::slice::from_ref(&individual);
+        let plan = self.plan(self.steps(), &Term::ALL);
+        let tally = tried(&self.trials(individuals), self.bench(plan, 1))?.remove(0);
+        Ok(self.score_of(&individual.body, tally.as_ref(), &Term::ALL))
     }
 
     /// Records a genome for so many steps from the start, whether it falls or not.
@@ -199,18 +284,15 @@ impl Arena {
         genomes: &[Vec<f32>],
         threads: usize,
     ) -> Result<Vec<Robustness>, ArenaError> {
-        let tallies = tried(&self.varied(genomes), self.bench(Plan::JUDGED, threads))?;
-        Ok(self.robustness_of(&tallies))
+        let individuals = self.individuals(genomes)?;
+        let tallies = tried(&self.varied(&individuals), self.bench(Plan::JUDGED, threads))?;
+        Ok(self.robustness_of(&individuals, &tallies))
     }
 
-    /// Every genome under all physics that a robust motion gets through.
-    pub(crate) fn varied<'a>(&'a self, genomes: &'a [Vec<f32>]) -> Vec<Trial<'a>> {
+    /// Every individual under all physics that a robust motion gets through.
+    pub(crate) fn varied<'a>(&self, individuals: &'a [Individual]) -> Vec<Trial<'a>> {
         let calm = self.settings.world;
-        let scaled = |friction: f32, mass: f32| Physics {
-            friction_scale: calm.friction_scale * friction,
-            mass_scale: calm.mass_scale * mass,
-            ..calm
-        };
+        let scaled = |friction: f32, mass: f32| calm.scaled(friction, mass, 1.0, 1.0);
         let always = self.task.pushed().then_some(FIRST_PUSHES);
         let mut ways: Vec<(Physics, Option<u64>)> = vec![
             (calm, always),
@@ -220,18 +302,22 @@ impl Arena {
             (scaled(1.0, 1.1), always),
         ];
         ways.extend((0..PUSHED).map(|seed| (calm, Some(seed))));
-        let of = |genome: &'a Vec<f32>| {
-            let body = &self.body;
-            let trial = move |(physics, pushes)| Trial { body, genome, physics, pushes };
+        let of = |individual: &'a Individual| {
+            let trial = move |(physics, pushes)| Trial { individual, physics, pushes };
             ways.clone().into_iter().map(trial)
         };
-        genomes.iter().flat_map(of).collect()
+        individuals.iter().flat_map(of).collect()
     }
 
     /// What trials of [`Arena::varied`] came to.
-    pub(crate) fn robustness_of(&self, tallies: &[Option<Tally>]) -> Vec<Robustness> {
-        let of = |tallies: &[Option<Tally>]| {
-            let usable: Vec<_> = tallies.iter().map(|tally| self.natural(tally).1).collect();
+    pub(crate) fn robustness_of(
+        &self,
+        individuals: &[Individual],
+        tallies: &[Option<Tally>],
+    ) -> Vec<Robustness> {
+        let of = |(individual, tallies): (&Individual, &[Option<Tally>])| {
+            let usable: Vec<_> =
+                tallies.iter().map(|tally| self.natural(&individual.body, tally).1).collect();
             Robustness {
                 usable: usable[0],
                 friction: [usable[1], usable[2]],
@@ -239,16 +325,16 @@ impl Arena {
                 pushes: usable[5..].iter().filter(|&&usable| usable).count(),
             }
         };
-        tallies.chunks(WAYS).map(of).collect()
+        individuals.iter().zip(tallies.chunks(WAYS)).map(of).collect()
     }
 
     /// Natural fitness, and whether the motion is usable; NaN and no if it came to nothing that is a
     /// number.
-    pub(crate) fn natural(&self, tally: &Option<Tally>) -> (f64, bool) {
+    pub(crate) fn natural(&self, body: &Body, tally: &Option<Tally>) -> (f64, bool) {
         let gravity = f64::from(self.settings.world.gravity);
         tally.as_ref().map_or((f64::NAN, false), |tally| {
-            let natural = self.task.natural(tally, &self.body, gravity);
-            (natural, self.task.reasons(tally, &self.body).is_empty())
+            let natural = self.task.natural(tally, body, gravity);
+            (natural, self.task.reasons(tally, body).is_empty())
         })
     }
 
@@ -271,12 +357,51 @@ impl Arena {
         Bench { controller: &self.settings.controller, width: self.width, threads, plan }
     }
 
-    /// Every genome as it is.
-    pub(crate) fn trials<'a>(&'a self, genomes: &'a [Vec<f32>]) -> Vec<Trial<'a>> {
+    /// Every individual as it is.
+    pub(crate) fn trials<'a>(&self, individuals: &'a [Individual]) -> Vec<Trial<'a>> {
         let physics = self.settings.world;
         let pushes = self.task.pushed().then_some(FIRST_PUSHES);
-        let trial = |genome: &'a Vec<f32>| Trial { body: &self.body, genome, physics, pushes };
-        genomes.iter().map(trial).collect()
+        let trial = |individual: &'a Individual| Trial { individual, physics, pushes };
+        individuals.iter().map(trial).collect()
+    }
+
+    /// Every individual of a round: as it is, then, if that is asked for, under other physics, which
+    /// are the same for all.
+    pub(crate) fn of_round<'a>(
+        &self,
+        individuals: &'a [Individual],
+        round: Round,
+    ) -> Vec<Trial<'a>> {
+        let mut trials = self.trials(individuals);
+        if let Some(seed) = round.draw {
+            let (physics, pushes) = (drawn(self.settings.world, seed), Some(seed));
+            trials.extend(individuals.iter().map(|individual| Trial {
+                individual,
+                physics,
+                pushes,
+            }));
+        }
+        trials
+    }
+
+    /// What trials of [`Arena::of_round`] came to: of each individual the worse one.
+    pub(crate) fn round_scores(
+        &self,
+        individuals: &[Individual],
+        tallies: &[Option<Tally>],
+    ) -> Vec<Score> {
+        let wanted = self.wanted();
+        let score = |index: usize| {
+            let tries = tallies.iter().skip(index).step_by(individuals.len());
+            let body = &individuals[index].body;
+            let scores = tries.map(|tally| self.score_of(body, tally.as_ref(), &wanted));
+            let worse = |a: Score, b: Score| {
+                // What is not a number is the worst.
+                if a.fitness.is_nan() || a.fitness <= b.fitness { a } else { b }
+            };
+            scores.reduce(worse).expect("each is tried")
+        };
+        (0..individuals.len()).map(score).collect()
     }
 
     /// How episodes of so many steps go; `wanted`: the terms that are to be measured.
@@ -289,32 +414,24 @@ impl Arena {
         }
     }
 
-    /// How episodes go in which fitness is measured, and the terms that count.
-    pub(crate) fn fitness_plan(&self, steps: u32) -> (Plan, Vec<Term>) {
+    /// The terms that count.
+    fn wanted(&self) -> Vec<Term> {
         let counts = |(term, weight): (&Term, &f64)| (*weight != 0.0).then_some(*term);
-        let wanted: Vec<_> = self.weights().iter().filter_map(counts).collect();
-        (self.plan(steps, &wanted), wanted)
+        self.weights().iter().filter_map(counts).collect()
     }
 
-    fn scores(
-        &self,
-        genomes: &[Vec<f32>],
-        steps: u32,
-        threads: usize,
-        wanted: &[Term],
-    ) -> Result<Vec<Score>, ArenaError> {
-        let plan = self.plan(steps, wanted);
-        let tallies = tried(&self.trials(genomes), self.bench(plan, threads))?;
-        Ok(tallies.into_iter().map(|tally| self.score_of(tally, wanted)).collect())
+    /// How episodes of a round go.
+    pub(crate) fn round_plan(&self, round: Round) -> Plan {
+        self.plan(round.steps, &self.wanted())
     }
 
-    pub(crate) fn score_of(&self, tally: Option<Tally>, wanted: &[Term]) -> Score {
+    fn score_of(&self, body: &Body, tally: Option<&Tally>, wanted: &[Term]) -> Score {
         let Some(tally) = tally else {
             let (fitness, terms) = (f64::NAN, Terms::new());
             return Score { fitness, alive: 0.0, behaviour: [0.0; 2], terms };
         };
         let gravity = f64::from(self.settings.world.gravity);
-        let value = |term: &Term| (*term, term.of(&tally, &self.body, gravity, self.task));
+        let value = |term: &Term| (*term, term.of(tally, body, gravity, self.task));
         let terms: Terms = wanted.iter().map(value).collect();
         let weighted = self.weights().iter().filter(|(_, weight)| **weight != 0.0);
         let down = if tally.duty.is_empty() { tally.torso_contact } else { mean(&tally.duty) };
@@ -326,4 +443,11 @@ impl Arena {
             terms,
         }
     }
+}
+
+/// Other physics than those, to be drawn in training.
+fn drawn(calm: Physics, seed: u64) -> Physics {
+    let mut random = Random::new(seed);
+    let mut about_one = |most: f32| 1.0 + random.around(most);
+    calm.scaled(about_one(0.25), about_one(0.1), about_one(0.1), about_one(0.1))
 }

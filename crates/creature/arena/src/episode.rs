@@ -37,9 +37,10 @@ pub(crate) struct Crew<S: Simd> {
     pub touching: Vec<Mask<S>>,
     pub torques: Vec<Lanes<S>>,
     pub torso: [Lanes<S>; 2],
-    /// What a push changes, metres a second, and who draws its sign in each lane.
+    /// What a push changes, metres a second, and in each lane after how many steps there is one and
+    /// who draws its sign.
     push: Lanes<S>,
-    pushers: Vec<Option<Random>>,
+    pushers: Vec<Option<(u32, Random)>>,
     pub meter: Meter<S>,
     /// Where a controller gave something that is not a number.
     pub lost: Mask<S>,
@@ -68,14 +69,19 @@ impl<S: Simd> Crew<S> {
             PUSH * body.mass() / body.part_mass(body.torso())
         };
         let dt = world.dt();
+        let pusher = |(lane, seed): (usize, &Option<u64>)| {
+            let every = (PUSH_EVERY / dt.lane(lane)) as u32;
+            seed.map(|seed| (every.max(1), Random::new(seed)))
+        };
+        let Plan { steps, falls, series, .. } = plan;
         Self {
-            meter: Meter::new(body, dt, torso, &touching, plan.steps, plan.falls, plan.series),
+            meter: Meter::new(simd, bodies, dt, torso, &touching, steps, falls, series),
             felt,
             touching,
             torques: vec![zero; if plan.torques { joints } else { 0 }],
             torso,
             push: Lanes::from_fn(simd, share),
-            pushers: seeds.iter().map(|seed| seed.map(Random::new)).collect(),
+            pushers: seeds.iter().enumerate().map(pusher).collect(),
             lost: never,
             done: false,
             pilots,
@@ -154,15 +160,24 @@ impl<S: Simd> Crew<S> {
         Ok(())
     }
 
+    /// The first step from this one on in which somebody is pushed.
+    fn next_push(&self, step: u32) -> u32 {
+        let nexts = self.pushers.iter().flatten().map(|(every, _)| step.next_multiple_of(*every));
+        nexts.min().unwrap_or(u32::MAX)
+    }
+
     fn shove<W: Stage<S>>(
         &mut self,
         world: &mut W,
         group: usize,
         torso: usize,
+        step: u32,
     ) -> Result<(), WorldError> {
         let mut signs = [0.0; 16];
         for (sign, pusher) in signs.iter_mut().zip(&mut self.pushers) {
-            if let Some(random) = pusher {
+            if let Some((every, random)) = pusher
+                && step.is_multiple_of(*every)
+            {
                 *sign = if random.unit() < 0.5 { -1.0 } else { 1.0 };
             }
         }
@@ -177,18 +192,16 @@ pub(crate) struct Episode<S: Simd, W> {
     pub crews: Vec<Crew<S>>,
     plan: Plan,
     step: u32,
-    between_pushes: u32,
+    next_push: u32,
 }
 
 impl<S: Simd, W: Stage<S>> Episode<S, W> {
     pub fn new(world: W, mut crews: Vec<Crew<S>>, body: &Body, plan: Plan) -> Self {
-        let pushed = crews.iter().any(|crew| crew.pushers.iter().any(Option::is_some));
-        let every = (PUSH_EVERY / world.dt().lane(0)) as u32;
         for (group, crew) in crews.iter_mut().enumerate() {
             crew.sense(&world, group, body, false);
         }
-        let between_pushes = if pushed { every.max(1) } else { u32::MAX };
-        Self { world, crews, plan, step: 0, between_pushes }
+        let next_push = crews.iter().map(|crew| crew.next_push(1)).min().unwrap_or(u32::MAX);
+        Self { world, crews, plan, step: 0, next_push }
     }
 
     /// Goes on for at most so many steps, and says whether it is over. `watch` is called after every
@@ -205,9 +218,13 @@ impl<S: Simd, W: Stage<S>> Episode<S, W> {
             self.step += 1;
             for (group, crew) in self.crews.iter_mut().enumerate() {
                 crew.steer(&mut self.world, group, body)?;
-                if self.step.is_multiple_of(self.between_pushes) {
-                    crew.shove(&mut self.world, group, body.torso())?;
+                if self.step == self.next_push {
+                    crew.shove(&mut self.world, group, body.torso(), self.step)?;
                 }
+            }
+            if self.step == self.next_push {
+                let nexts = self.crews.iter().map(|crew| crew.next_push(self.step + 1));
+                self.next_push = nexts.min().unwrap_or(u32::MAX);
             }
             self.world.step()?;
             let mut all_done = true;

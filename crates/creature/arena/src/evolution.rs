@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::episode::Plan;
 use crate::meter::Tally;
 use crate::settings::JUDGED;
-use crate::trials::tried;
-use crate::{Arena, ArenaError, Robustness, Score};
+use crate::trials::{Individual, tried};
+use crate::{Arena, ArenaError, Robustness, Round, Score};
 
 /// Of those whose replays are usable, the best so many are replayed under other physics.
 const VARIED: usize = 2;
@@ -72,8 +72,12 @@ pub struct Told {
     pub mean: f64,
     /// Steps of its episodes.
     pub steps: u32,
+    /// How many lessons were ahead of the task itself.
+    pub ahead: usize,
     /// Whether there is a new champion.
     pub crowned: bool,
+    /// Whether a lesson is learned, and the next one begins.
+    pub learned: bool,
     /// Whether the search began anew after it.
     pub restarted: bool,
 }
@@ -84,7 +88,9 @@ pub struct Evolution {
     strategy: Search,
     /// Generations that were told, those before a restart included.
     generation: u64,
-    /// Which of the arena's stages it is in.
+    /// How many lessons are ahead of the task itself.
+    ahead: usize,
+    /// Which of the stages of that it is in.
     stage: usize,
     restarts: u64,
     /// Best fitness of the stage, and when it was reached.
@@ -103,6 +109,7 @@ impl Evolution {
         Ok(Self {
             strategy,
             generation: 0,
+            ahead: arena.lessons(),
             stage: 0,
             restarts: 0,
             best: None,
@@ -119,7 +126,8 @@ impl Evolution {
         self.strategy.check()?;
         let champion = self.champion.iter().map(|champion| &champion.genome);
         let fits = |genome: &Vec<f32>| arena.pilot(genome).is_ok();
-        let known = self.stage < arena.stages().len();
+        let known =
+            self.ahead <= arena.lessons() && self.stage < arena.ahead(self.ahead).stages().len();
         if known && self.strategy.ask().iter().chain(champion).all(fits) {
             return Ok(());
         }
@@ -160,9 +168,25 @@ impl Evolution {
         self.strategy.ask()
     }
 
-    /// In episodes of how many steps.
-    pub fn steps(&self, arena: &Arena) -> u32 {
-        arena.stages()[self.stage]
+    /// How they are tried.
+    pub fn round(&self, arena: &Arena) -> Round {
+        let settings = arena.settings();
+        let draw = settings.seed ^ self.generation.wrapping_mul(0xD1B5_4A32_D192_ED03);
+        Round {
+            ahead: self.ahead,
+            steps: arena.ahead(self.ahead).stages()[self.stage],
+            draw: settings.search.randomise.expect("resolved").then_some(draw),
+        }
+    }
+
+    /// How many lessons are ahead of the task itself.
+    pub fn ahead(&self) -> usize {
+        self.ahead
+    }
+
+    /// Whether the champion is as it shall be.
+    pub fn has(&self, until: Until) -> bool {
+        self.champion().is_some_and(|champion| champion.is(until))
     }
 
     /// One generation: tries it, takes what it did, looks for a champion.
@@ -170,7 +194,7 @@ impl Evolution {
     /// # Errors
     /// A refusal of the physics engine.
     pub fn step(&mut self, arena: &Arena, threads: usize) -> Result<Told, ArenaError> {
-        let scores = arena.evaluate(self.ask(), self.steps(arena), threads)?;
+        let scores = arena.try_round(self.ask(), self.round(arena), threads)?;
         self.tell(arena, &scores, threads)
     }
 
@@ -186,12 +210,12 @@ impl Evolution {
     ) -> Result<Told, ArenaError> {
         let (mut told, hopefuls) = self.take(arena, scores)?;
         if !hopefuls.is_empty() {
-            let trials = arena.trials(&hopefuls);
-            let replays = tried(&trials, arena.bench(Plan::JUDGED, threads))?;
-            let finalists = self.finalists(arena, &hopefuls, &replays);
-            let genomes = finalists.genomes();
-            let varied = tried(&arena.varied(&genomes), arena.bench(Plan::JUDGED, threads))?;
-            told.crowned = self.crown(arena, &finalists, &varied)?;
+            let lesson = arena.ahead(told.ahead);
+            let replays = tried(&lesson.trials(&hopefuls), lesson.bench(Plan::JUDGED, threads))?;
+            let finalists = self.finalists(arena, told, hopefuls, &replays);
+            let variations = lesson.varied(&finalists.usable);
+            let varied = tried(&variations, lesson.bench(Plan::JUDGED, threads))?;
+            self.crown(arena, &finalists, &varied, &mut told)?;
         }
         Ok(told)
     }
@@ -201,11 +225,12 @@ impl Evolution {
         &mut self,
         arena: &Arena,
         scores: &[Score],
-    ) -> Result<(Told, Vec<Vec<f32>>), ArenaError> {
+    ) -> Result<(Told, Vec<Individual>), ArenaError> {
+        let lesson = arena.ahead(self.ahead);
         let asked = self.ask().to_vec();
         let outcome =
             |score: &Score| Outcome { fitness: score.fitness, behaviour: score.behaviour.to_vec() };
-        let steps = self.steps(arena);
+        let Round { ahead, steps, .. } = self.round(arena);
         self.strategy.tell(&scores.iter().map(outcome).collect::<Vec<_>>())?;
         self.generation += 1;
         let mut order: Vec<_> = (0..scores.len()).collect();
@@ -218,12 +243,12 @@ impl Evolution {
             (self.best, self.best_at) = (Some(best), self.generation);
         }
         let many = arena.settings().search.trials.expect("resolved");
-        let first = order.iter().take(many).map(|&index| asked[index].clone());
-        let hopefuls: Vec<_> = first.collect();
+        let first = order.iter().take(many).map(|&index| lesson.individual(&asked[index]));
+        let hopefuls = first.collect::<Result<Vec<_>, _>>()?;
         let crowned = many == 0
             && self.crown_the_fittest(arena, order.first().map(|&index| &asked[index]), best)?;
         if order.first().is_some_and(|&index| scores[index].alive >= 1.0)
-            && self.stage + 1 < arena.stages().len()
+            && self.stage + 1 < lesson.stages().len()
         {
             self.stage += 1;
             (self.best, self.best_at) = (None, self.generation);
@@ -236,10 +261,11 @@ impl Evolution {
             self.restarts += 1;
             let seed = arena.settings().seed ^ self.restarts.wrapping_mul(0x9E37_79B9_7F4A_7C15);
             self.strategy = arena.strategy().start(arena.genes(), seed)?;
+            self.ahead = arena.lessons();
             (self.stage, self.best, self.best_at) = (0, None, self.generation);
         }
         let mean = if order.is_empty() { f64::NAN } else { sum / order.len() as f64 };
-        Ok((Told { best, mean, steps, crowned, restarted }, hopefuls))
+        Ok((Told { best, mean, steps, ahead, crowned, learned: false, restarted }, hopefuls))
     }
 
     /// The seed's way: whoever has the most fitness.
@@ -253,7 +279,7 @@ impl Evolution {
         let better =
             |fitness: f64| self.champion.as_ref().is_none_or(|champion| fitness > champion.fitness);
         // Shorter episodes are no measure.
-        let whole = self.steps(arena) == arena.steps();
+        let whole = self.round(arena) == Round { ahead: 0, steps: arena.steps(), draw: None };
         if whole && !better(reached) {
             return Ok(false);
         }
@@ -276,77 +302,99 @@ impl Evolution {
     pub(crate) fn finalists(
         &self,
         arena: &Arena,
-        genomes: &[Vec<f32>],
+        told: Told,
+        hopefuls: Vec<Individual>,
         replays: &[Option<Tally>],
     ) -> Finalists {
-        let found = replays.iter().map(|tally| arena.natural(tally)).zip(genomes);
-        let mut order: Vec<_> = found.filter(|((natural, _), _)| natural.is_finite()).collect();
+        let natural = |(who, tally): (Individual, &Option<Tally>)| {
+            let (natural, usable) = arena.ahead(told.ahead).natural(&who.body, tally);
+            Finalist { natural, usable, who }
+        };
+        let found = hopefuls.into_iter().zip(replays).map(natural);
+        let mut order: Vec<_> = found.filter(|finalist| finalist.natural.is_finite()).collect();
         // Usable first.
         order.sort_by(|a, b| {
-            let key = |((natural, usable), _): &((f64, bool), _)| (*usable, *natural);
+            let key = |finalist: &Finalist| (finalist.usable, finalist.natural);
             key(b).partial_cmp(&key(a)).expect("finite")
         });
-        let before = self.merit();
+        let before = self.merit(told);
         let most = USABLE + 20.0 * EACH_HELD + ROBUST + GOOD;
-        let hopeful = order.iter().filter(|((n, usable), _)| *usable && most + n > before);
-        Finalists {
-            best: order.first().map(|((natural, _), genome)| (*natural, (*genome).clone())),
-            usable: hopeful.take(VARIED).map(|((n, _), genome)| (*n, (*genome).clone())).collect(),
-        }
+        let best = order.first().map(|best| (best.natural, best.who.genome.clone()));
+        let hopeful = |finalist: &Finalist| finalist.usable && most + finalist.natural > before;
+        let usable = order.into_iter().filter(hopeful).take(VARIED);
+        let (natural, usable) = usable.map(|finalist| (finalist.natural, finalist.who)).unzip();
+        Finalists { best, natural, usable }
     }
 
-    fn merit(&self) -> f64 {
-        self.champion.as_ref().map_or(f64::NEG_INFINITY, |champion| champion.merit)
+    /// What a champion must be better than; in a lesson, which has none, than nothing.
+    fn merit(&self, told: Told) -> f64 {
+        let champion = self.champion.as_ref().filter(|_| told.ahead == 0);
+        champion.map_or(f64::NEG_INFINITY, |champion| champion.merit)
     }
 
-    /// Whoever holds up best, if that is better than the champion.
+    /// Whoever holds up best is the champion, if better than that; or, in a lesson, ends it.
     pub(crate) fn crown(
         &mut self,
         arena: &Arena,
         finalists: &Finalists,
         varied: &[Option<Tally>],
-    ) -> Result<bool, ArenaError> {
-        let Some((natural, genome)) = &finalists.best else { return Ok(false) };
+        told: &mut Told,
+    ) -> Result<(), ArenaError> {
+        let Some((natural, genome)) = &finalists.best else { return Ok(()) };
         let mut best = (*natural, genome, Robustness::default());
-        for ((natural, genome), held) in finalists.usable.iter().zip(arena.robustness_of(varied)) {
+        let lesson = arena.ahead(told.ahead);
+        let held = lesson.robustness_of(&finalists.usable, varied);
+        for ((natural, who), held) in finalists.natural.iter().zip(&finalists.usable).zip(held) {
             let robust = if held.is_robust() { ROBUST } else { 0.0 };
             let merit = USABLE + EACH_HELD * held.held() as f64 + robust + natural;
             if merit > best.0 {
-                best = (merit, genome, held);
+                best = (merit, &who.genome, held);
             }
         }
         let (mut merit, genome, robustness) = best;
         let mut good = false;
-        if robustness.usable && merit + GOOD > self.merit() {
-            good = arena.judge(&arena.record(genome, JUDGED)?).good;
+        if robustness.usable && merit + GOOD > self.merit(*told) {
+            good = lesson.judge(&lesson.record(genome, JUDGED)?).good;
             merit += if good { GOOD } else { 0.0 };
         }
-        if merit <= self.merit() {
-            return Ok(false);
+        if merit <= self.merit(*told) {
+            return Ok(());
         }
-        self.champion = Some(Champion {
+        let champion = Champion {
             genome: genome.clone(),
-            fitness: arena.score(genome)?.fitness,
+            fitness: lesson.score(genome)?.fitness,
             generation: self.generation,
             robustness: Some(robustness),
             good,
             merit,
-        });
-        Ok(true)
+        };
+        if told.ahead == 0 {
+            (self.champion, told.crowned) = (Some(champion), true);
+        } else {
+            let until = arena.settings().curriculum[arena.lessons() - told.ahead].until;
+            // A search that began anew is at the first lesson again.
+            told.learned = champion.is(until) && !told.restarted;
+            if told.learned {
+                self.ahead -= 1;
+                (self.stage, self.best, self.best_at) = (0, None, self.generation);
+            }
+        }
+        Ok(())
     }
 }
 
-/// Natural fitness and genomes of those whose replays were best.
+/// Who was replayed, and how it did.
+struct Finalist {
+    natural: f64,
+    usable: bool,
+    who: Individual,
+}
+
+/// Those whose replays were best.
 pub(crate) struct Finalists {
-    /// The best one, usable or not.
+    /// Natural fitness and genome of the best one, usable or not.
     best: Option<(f64, Vec<f32>)>,
-    /// Those who may be better than the champion.
-    usable: Vec<(f64, Vec<f32>)>,
-}
-
-impl Finalists {
-    /// Who is to be tried under other physics.
-    pub fn genomes(&self) -> Vec<Vec<f32>> {
-        self.usable.iter().map(|(_, genome)| genome.clone()).collect()
-    }
+    /// Natural fitness of those who may be better than the champion, and they.
+    natural: Vec<f64>,
+    pub usable: Vec<Individual>,
 }

@@ -1,7 +1,7 @@
 //! When a motion can be used: looked at for longer than it was trained, never by its fitness.
 
 use ambulo_body::Body;
-use ambulo_lanes::{Lanes, Mask, math};
+use ambulo_lanes::{Lanes, Mask, Scalar, math};
 use ambulo_world::Physics;
 use serde::Serialize;
 
@@ -148,7 +148,7 @@ fn joint_series(rollout: &Rollout, from: usize, joints: usize) -> Vec<Vec<f32>> 
 }
 
 pub(crate) fn judge(arena: &Arena, rollout: &Rollout) -> Judgement {
-    let (body, dt) = (arena.body(), rollout.dt);
+    let (body, dt) = (&*rollout.body, rollout.dt);
     let steps = rollout.steps();
     let tally = measured(body, rollout);
     let joints = body.driven().len();
@@ -220,7 +220,8 @@ fn measured(body: &Body, rollout: &Rollout) -> Tally {
     };
     let (steps, dt) = (rollout.steps(), Lanes::from(rollout.dt));
     let start = rollout.torso[0].map(Lanes::from);
-    let mut meter = Meter::new(body, dt, start, &touching(0), steps as u32, false, false);
+    let mut meter =
+        Meter::new(Scalar, &[body], dt, start, &touching(0), steps as u32, false, false);
     for step in 1..=steps {
         let row = |values: &[f32], step: usize| lanes(&values[step * joints..(step + 1) * joints]);
         let (now, before) = (row(&rollout.angles, step), row(&rollout.angles, step - 1));

@@ -2,12 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use crate::arena::WAYS;
 use crate::episode::Plan;
 use crate::evolution::Finalists;
 use crate::meter::Tally;
-use crate::trials::{Flight, Trial};
-use crate::{Arena, ArenaError, Champion, Evolution, Told, Until};
+use crate::trials::{Flight, Individual, Trial};
+use crate::{Arena, ArenaError, Champion, Evolution, Round, Told, Until};
 
 /// Steps between two looks at the clock: a fraction of a millisecond.
 const PORTION: u32 = 32;
@@ -23,8 +22,7 @@ pub struct Learner {
 /// What is being tried.
 struct Work {
     chore: Chore,
-    /// Individuals to be tried, how they are told apart by the chore, and what came of them.
-    genomes: Vec<Vec<f32>>,
+    individuals: Vec<Individual>,
     /// How many trials they come to.
     trials: usize,
     found: Vec<Option<Tally>>,
@@ -33,7 +31,7 @@ struct Work {
 
 enum Chore {
     /// A generation's fitness.
-    Generation,
+    Generation(Round),
     /// Replays of its best.
     Replays(Told),
     /// The best of those under other physics.
@@ -67,7 +65,7 @@ impl Learner {
 
     /// Whether the champion is as it shall be.
     pub fn has(&self, until: Until) -> bool {
-        self.champion().is_some_and(|champion| champion.is(until))
+        self.evolution.has(until)
     }
 
     /// Works for about so long, on this thread, and says how the generation did if one came to its
@@ -93,36 +91,46 @@ impl Learner {
     fn portion(&mut self) -> Result<Option<Told>, ArenaError> {
         let mut work = match self.work.take() {
             Some(work) => work,
-            None => Work::new(Chore::Generation, self.evolution.ask().to_vec()),
+            None => {
+                let round = self.evolution.round(&self.arena);
+                let lesson = self.arena.ahead(round.ahead);
+                self.begin(Chore::Generation(round), lesson.individuals(self.evolution.ask())?)
+            }
         };
         if !self.advance(&mut work)? {
             self.work = Some(work);
             return Ok(None);
         }
-        let Work { chore, genomes, found, .. } = work;
+        let Work { chore, individuals, found, .. } = work;
         match chore {
-            Chore::Generation => {
-                let (_, wanted) = self.arena.fitness_plan(self.evolution.steps(&self.arena));
-                let scores = found.into_iter().map(|tally| self.arena.score_of(tally, &wanted));
-                let scores: Vec<_> = scores.collect();
+            Chore::Generation(round) => {
+                let scores = self.arena.ahead(round.ahead).round_scores(&individuals, &found);
                 let (told, hopefuls) = self.evolution.take(&self.arena, &scores)?;
                 if hopefuls.is_empty() {
                     return Ok(Some(told));
                 }
-                self.work = Some(Work::new(Chore::Replays(told), hopefuls));
+                self.work = Some(self.begin(Chore::Replays(told), hopefuls));
                 Ok(None)
             }
             Chore::Replays(told) => {
-                let finalists = self.evolution.finalists(&self.arena, &genomes, &found);
-                let genomes = finalists.genomes();
-                self.work = Some(Work::new(Chore::Variations(told, finalists), genomes));
+                let mut finalists =
+                    self.evolution.finalists(&self.arena, told, individuals, &found);
+                let usable = std::mem::take(&mut finalists.usable);
+                self.work = Some(self.begin(Chore::Variations(told, finalists), usable));
                 Ok(None)
             }
-            Chore::Variations(mut told, finalists) => {
-                told.crowned = self.evolution.crown(&self.arena, &finalists, &found)?;
+            Chore::Variations(mut told, mut finalists) => {
+                finalists.usable = individuals;
+                self.evolution.crown(&self.arena, &finalists, &found, &mut told)?;
                 Ok(Some(told))
             }
         }
+    }
+
+    fn begin(&self, chore: Chore, individuals: Vec<Individual>) -> Work {
+        let mut work = Work { chore, individuals, trials: 0, found: Vec::new(), flight: None };
+        work.trials = self.trials(&work).1.len();
+        work
     }
 
     /// Some steps of the batch at hand; whether all batches are done.
@@ -134,9 +142,9 @@ impl Learner {
         let mut flight = match work.flight.take() {
             Some(flight) => flight,
             None => {
-                let (trials, plan) = self.trials(work);
-                let batch = done..(done + self.arena.width().lanes()).min(trials.len());
-                Flight::new(&trials[batch], self.arena.bench(plan, 1))?
+                let (arena, trials, plan) = self.trials(work);
+                let batch = done..(done + arena.width().lanes()).min(trials.len());
+                Flight::new(&trials[batch], arena.bench(plan, 1))?
             }
         };
         match flight.advance(PORTION)? {
@@ -146,22 +154,22 @@ impl Learner {
         Ok(work.found.len() >= work.trials)
     }
 
-    fn trials<'a>(&'a self, work: &'a Work) -> (Vec<Trial<'a>>, Plan) {
-        match work.chore {
-            Chore::Generation => {
-                let (plan, _) = self.arena.fitness_plan(self.evolution.steps(&self.arena));
-                (self.arena.trials(&work.genomes), plan)
+    /// All that is to be tried, where and how.
+    fn trials<'a>(&self, work: &'a Work) -> (&Arena, Vec<Trial<'a>>, Plan) {
+        let who = &work.individuals;
+        match &work.chore {
+            Chore::Generation(round) => {
+                let arena = self.arena.ahead(round.ahead);
+                (arena, arena.of_round(who, *round), arena.round_plan(*round))
             }
-            Chore::Replays(_) => (self.arena.trials(&work.genomes), Plan::JUDGED),
-            Chore::Variations(..) => (self.arena.varied(&work.genomes), Plan::JUDGED),
+            Chore::Replays(told) => {
+                let arena = self.arena.ahead(told.ahead);
+                (arena, arena.trials(who), Plan::JUDGED)
+            }
+            Chore::Variations(told, _) => {
+                let arena = self.arena.ahead(told.ahead);
+                (arena, arena.varied(who), Plan::JUDGED)
+            }
         }
-    }
-}
-
-impl Work {
-    fn new(chore: Chore, genomes: Vec<Vec<f32>>) -> Self {
-        let ways = if matches!(chore, Chore::Variations(..)) { WAYS } else { 1 };
-        let trials = ways * genomes.len();
-        Self { chore, genomes, trials, found: Vec::new(), flight: None }
     }
 }

@@ -127,10 +127,11 @@ pub(crate) struct Meter<S: Simd> {
 }
 
 impl<S: Simd> Meter<S> {
-    /// Of episodes of so many steps; `start`: where the torso's centre is in the start pose; `falls`:
+    /// Of episodes of so many steps; `bodies`: one for each lane, or for all; `start`: where the torso's centre is in the start pose; `falls`:
     /// whether a fall ends one; `series`: whether the joints' angles are kept.
     pub fn new(
-        body: &Body,
+        simd: S,
+        bodies: &[&Body],
         dt: Lanes<S>,
         start: [Lanes<S>; 2],
         touching: &[Mask<S>],
@@ -140,7 +141,9 @@ impl<S: Simd> Meter<S> {
     ) -> Self {
         let (zero, one) = (dt.like(0.0), dt.like(1.0));
         let never = zero.less(zero);
+        let body = bodies[0];
         let (joints, legs) = (body.driven().len(), body.legs());
+        let tall = |lane: usize| bodies[lane.min(bodies.len() - 1)].standing_height();
         let feet: Vec<_> = legs.iter().map(|leg| leg.foot).collect();
         let on = |parts: &[usize]| parts.iter().fold(never, |on, &part| on | touching[part]);
         let all: Vec<_> = (0..touching.len()).collect();
@@ -151,7 +154,7 @@ impl<S: Simd> Meter<S> {
             torso: body.torso(),
             dt,
             // Of the torso's centre, to stand: 0.4 of the standing height below its start.
-            stand: start[1] - 0.4 * body.standing_height(),
+            stand: start[1] - Lanes::from_fn(simd, |lane| 0.4 * tall(lane)),
             start,
             end: start,
             marks: [start[0]; 5],

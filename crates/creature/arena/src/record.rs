@@ -1,5 +1,7 @@
 //! An episode, kept whole.
 
+use std::sync::Arc;
+
 use ambulo_body::Body;
 use ambulo_lanes::{Lanes, Scalar};
 use ambulo_world::{Pose, Solver, Stage};
@@ -12,6 +14,8 @@ use crate::{Arena, ArenaError};
 /// T steps of one individual of P parts and J driven joints; all row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout {
+    /// Whose it is, with the measures that its genome gave it.
+    pub body: Arc<Body>,
     /// Seconds a step.
     pub dt: f32,
     /// (T + 1) × P × 3: x, y in metres and angle in radians of each part's frame, from the start.
@@ -44,23 +48,27 @@ impl Rollout {
 }
 
 pub(crate) fn record(arena: &Arena, genome: &[f32], steps: u32) -> Result<Rollout, ArenaError> {
-    let (body, physics) = (arena.body(), arena.settings().world);
+    let physics = arena.settings().world;
     let pushes = arena.task().pushed().then_some(FIRST_PUSHES);
-    let trial = Trial { body, genome, physics, pushes };
+    let individual = arena.individual(genome)?;
+    let trial = Trial { individual: &individual, physics, pushes };
     let plan = Plan { steps, falls: false, torques: true, series: false };
     let controller = &arena.settings().controller;
     match physics.solver {
-        Solver::Lockstep => watched(in_lanes(Scalar, &[trial], controller, plan)?, body),
-        Solver::Box2d => watched(in_world(&[trial], controller, plan)?, body),
+        Solver::Lockstep => {
+            watched(in_lanes(Scalar, &[trial], controller, plan)?, &individual.body)
+        }
+        Solver::Box2d => watched(in_world(&[trial], controller, plan)?, &individual.body),
     }
 }
 
 fn watched<W: Stage<Scalar>>(
     mut episode: Episode<Scalar, W>,
-    body: &Body,
+    body: &Arc<Body>,
 ) -> Result<Rollout, ArenaError> {
     let (parts, joints) = (body.parts().len(), body.driven().len());
     let mut rollout = Rollout {
+        body: body.clone(),
         dt: episode.world.dt().value(),
         poses: Vec::new(),
         touching: vec![false; parts],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ambulo_body::Body;
+use ambulo_body::{Body, Morphology};
 use ambulo_evolve::{EsSettings, GeneticSettings, NeatSettings, StrategySettings};
 use ambulo_pilot::{Kind, Pilot, Settings as ControllerSettings};
 use ambulo_world::Physics;
@@ -10,7 +10,7 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::tasks::{Task, task};
-use crate::{ArenaError, Term};
+use crate::{ArenaError, Lesson, Term};
 
 /// Steps on which motions are judged.
 pub(crate) const JUDGED: u32 = 2000;
@@ -77,6 +77,11 @@ pub struct SearchSettings {
     /// never. Default: 15, in the seed's protocol 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patience: Option<u64>,
+    /// Whether every generation is tried under other physics, too: friction times 0.75 to 1.25, mass,
+    /// motor torque and time step times 0.9 to 1.1, with pushes; the worse of both fitnesses counts.
+    /// Default: no.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub randomise: Option<bool>,
 }
 
 /// A search, all but the creature; every field has a default.
@@ -100,6 +105,12 @@ pub struct Settings {
     pub task: TaskSettings,
     /// How the champion is chosen.
     pub search: SearchSettings,
+    /// What of the body evolves with the controller. Default: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<Morphology>,
+    /// What is learned first, in this order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curriculum: Vec<Lesson>,
 }
 
 impl Default for Settings {
@@ -113,6 +124,8 @@ impl Default for Settings {
             world: Physics::default(),
             task: TaskSettings::default(),
             search: SearchSettings::default(),
+            body: None,
+            curriculum: Vec::new(),
         }
     }
 }
@@ -185,9 +198,20 @@ impl Settings {
         let search = SearchSettings {
             trials: Some(self.search.trials.unwrap_or(if natural { 16 } else { 0 })),
             patience: Some(self.search.patience.unwrap_or(if natural { 15 } else { 0 })),
+            randomise: Some(self.search.randomise.unwrap_or(false)),
         };
         range("search.trials", search.trials.expect("said") as u64, 0, 1000)?;
         range("search.patience", search.patience.expect("said"), 0, 1_000_000)?;
+        if !self.curriculum.is_empty() && search.trials == Some(0) {
+            return Err(ArenaError::Settings(
+                "curriculum: its lessons end by champions chosen on replays, but search.trials is 0"
+                    .into(),
+            ));
+        }
+        if let Some(body_settings) = &self.body {
+            let bad = |error| ArenaError::Settings(format!("body.{error}"));
+            body_settings.check(body).map_err(bad)?;
+        }
         let mut controller = self.controller.clone();
         if matches!(self.evolution, Some(StrategySettings::Neat(_))) {
             controller.kind.get_or_insert(Kind::Graph);
@@ -209,6 +233,11 @@ impl Settings {
         let mut evolution = evolution;
         let grows = controller.kind == Some(Kind::Graph);
         match &mut evolution {
+            StrategySettings::Neat(_) if self.body.is_some() => {
+                return Err(ArenaError::Settings(
+                    "body: it evolves with genomes of one length, and neat's are of many".into(),
+                ));
+            }
             StrategySettings::Neat(neat) if grows => {
                 let widths = Pilot::widths(body, &controller)?;
                 (neat.inputs, neat.outputs) = (widths[0], widths[widths.len() - 1]);

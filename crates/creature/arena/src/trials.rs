@@ -1,8 +1,8 @@
 //! Trying individuals, as many at a time as there are lanes, on all cores.
 
 use std::any::Any;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use ambulo_body::Body;
 use ambulo_lanes::{Job, Scalar, Simd, Width};
@@ -18,11 +18,26 @@ use crate::meter::Tally;
 const MOST_TOGETHER: usize = 12;
 const MOST_PARTS_TOGETHER: usize = 48;
 
+/// A genome and the body that it means.
+#[derive(Clone, Debug)]
+pub(crate) struct Individual {
+    pub genome: Vec<f32>,
+    /// How many of the genome's numbers, the first ones, are the controller's.
+    pub steering: usize,
+    pub body: Arc<Body>,
+}
+
+impl Individual {
+    /// What steers it.
+    pub fn genes(&self) -> &[f32] {
+        &self.genome[..self.steering]
+    }
+}
+
 /// An individual to be tried.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trial<'a> {
-    pub body: &'a Body,
-    pub genome: &'a [f32],
+    pub individual: &'a Individual,
     pub physics: Physics,
     /// Seed of the pushes that it gets, if any.
     pub pushes: Option<u64>,
@@ -38,7 +53,7 @@ pub(crate) struct Bench<'a> {
 }
 
 /// What was measured of each; nothing where a controller or the world gave what is not a number.
-/// Trials must be of one kind of body, solver and ground.
+/// Trials must be of one creature, whose measures may differ, and of one solver and ground.
 pub(crate) fn tried(
     trials: &[Trial<'_>],
     bench: Bench<'_>,
@@ -48,7 +63,7 @@ pub(crate) fn tried(
         Solver::Lockstep => bench.width.lanes(),
         Solver::Box2d => match first.physics.ground {
             Ground::Flat => {
-                (MOST_PARTS_TOGETHER / first.body.parts().len()).clamp(1, MOST_TOGETHER)
+                (MOST_PARTS_TOGETHER / first.individual.body.parts().len()).clamp(1, MOST_TOGETHER)
             }
             _ => 1,
         },
@@ -97,7 +112,11 @@ fn batch_of(trials: &[Trial<'_>], bench: Bench<'_>) -> Result<Vec<Option<Tally>>
         let width = Width::available().find(fits).expect("a batch fits its lanes");
         return width.run(InLanes { trials, bench });
     }
-    let shared = trials.windows(2).all(|pair| pair[0].physics == pair[1].physics);
+    let alike = |pair: &[Trial<'_>]| {
+        pair[0].physics == pair[1].physics
+            && Arc::ptr_eq(&pair[0].individual.body, &pair[1].individual.body)
+    };
+    let shared = trials.windows(2).all(alike);
     let each_alone = || {
         let alone = trials.iter();
         alone.map(|trial| Ok(batch_of(std::slice::from_ref(trial), bench)?.remove(0))).collect()
@@ -126,19 +145,17 @@ impl Job for InLanes<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let plan = self.bench.plan;
         let mut episode = in_lanes(simd, self.trials, self.bench.controller, plan)?;
-        episode.advance(self.trials[0].body, plan.steps, |_, _, _| {})?;
-        let crew = &episode.crews[0];
-        Ok((0..self.trials.len()).map(|lane| tally(crew, lane)).collect())
+        episode.advance(&self.trials[0].individual.body, plan.steps, |_, _, _| {})?;
+        Ok(tallies(&episode.crews[0], self.trials.len()))
     }
 }
 
 /// A batch that is tried bit by bit; in Box2D all at once.
 pub(crate) struct Flight {
     width: Width,
-    body: Body,
+    bodies: Vec<Arc<Body>>,
     /// An `Episode` of the width's lanes, or what Box2D has found.
     episode: Result<Box<dyn Any>, Vec<Option<Tally>>>,
-    individuals: usize,
 }
 
 impl Flight {
@@ -148,16 +165,15 @@ impl Flight {
             Solver::Lockstep => Ok(bench.width.run(Begin(InLanes { trials, bench }))?),
             Solver::Box2d => Err(batch_of(trials, bench)?),
         };
-        let body = trials[0].body.clone();
-        Ok(Self { width: bench.width, body, episode, individuals: trials.len() })
+        let bodies = trials.iter().map(|trial| trial.individual.body.clone()).collect();
+        Ok(Self { width: bench.width, bodies, episode })
     }
 
     /// Goes on for so many steps; what was measured once it is over.
     pub fn advance(&mut self, steps: u32) -> Result<Option<Vec<Option<Tally>>>, ArenaError> {
         match &mut self.episode {
             Ok(episode) => {
-                let (body, individuals) = (&self.body, self.individuals);
-                self.width.run(Advance { episode: &mut **episode, body, steps, individuals })
+                self.width.run(Advance { episode: &mut **episode, bodies: &self.bodies, steps })
             }
             Err(found) => Ok(Some(std::mem::take(found))),
         }
@@ -178,9 +194,8 @@ impl Job for Begin<'_> {
 
 struct Advance<'a> {
     episode: &'a mut dyn Any,
-    body: &'a Body,
+    bodies: &'a [Arc<Body>],
     steps: u32,
-    individuals: usize,
 }
 
 impl Job for Advance<'_> {
@@ -190,9 +205,8 @@ impl Job for Advance<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let episode = self.episode.downcast_mut::<Episode<S, Lockstep<S>>>();
         let episode = episode.expect("it was begun with as many lanes");
-        let over = episode.advance(self.body, self.steps, |_, _, _| {})?;
-        let crew = &episode.crews[0];
-        Ok(over.then(|| (0..self.individuals).map(|lane| tally(crew, lane)).collect()))
+        let over = episode.advance(&self.bodies[0], self.steps, |_, _, _| {})?;
+        Ok(over.then(|| tallies(&episode.crews[0], self.bodies.len())))
     }
 }
 
@@ -203,11 +217,12 @@ pub(crate) fn in_lanes<S: Simd>(
     controller: &ControllerSettings,
     plan: Plan,
 ) -> Result<Episode<S, Lockstep<S>>, ArenaError> {
-    let individuals: Vec<_> = trials.iter().map(|trial| (trial.body, &trial.physics)).collect();
-    let world = Lockstep::new(simd, &individuals)?;
-    let minds: Vec<_> = trials.iter().map(|trial| (trial.body, trial.genome)).collect();
+    let bodies: Vec<&Body> = trials.iter().map(|trial| &*trial.individual.body).collect();
+    let physics = trials.iter().map(|trial| &trial.physics);
+    let world = Lockstep::new(simd, &bodies.iter().copied().zip(physics).collect::<Vec<_>>())?;
+    let genes = trials.iter().map(|trial| trial.individual.genes());
+    let minds: Vec<_> = bodies.iter().copied().zip(genes).collect();
     let pilots = Pilots::new(simd, controller, &minds)?;
-    let bodies: Vec<_> = trials.iter().map(|trial| trial.body).collect();
     let seeds: Vec<_> = trials.iter().map(|trial| trial.pushes).collect();
     let crew = Crew::new(simd, &world, 0, &bodies, pilots, &seeds, plan);
     Ok(Episode::new(world, vec![crew], bodies[0], plan))
@@ -219,10 +234,10 @@ pub(crate) fn in_world(
     controller: &ControllerSettings,
     plan: Plan,
 ) -> Result<Episode<Scalar, World>, ArenaError> {
-    let body = trials[0].body;
+    let body = &*trials[0].individual.body;
     let world = World::new(body, &trials[0].physics, trials.len())?;
     let crew = |(group, trial): (usize, &Trial<'_>)| {
-        let pilots = Pilots::new(Scalar, controller, &[(body, trial.genome)])?;
+        let pilots = Pilots::new(Scalar, controller, &[(body, trial.individual.genes())])?;
         Ok(Crew::new(Scalar, &world, group, &[body], pilots, &[trial.pushes], plan))
     };
     let crews = trials.iter().enumerate().map(crew).collect::<Result<Vec<_>, ArenaError>>()?;
@@ -231,13 +246,17 @@ pub(crate) fn in_world(
 
 fn in_box2d(trials: &[Trial<'_>], bench: Bench<'_>) -> Result<Vec<Option<Tally>>, ArenaError> {
     let mut episode = in_world(trials, bench.controller, bench.plan)?;
-    episode.advance(trials[0].body, bench.plan.steps, |_, _, _| {})?;
-    Ok(episode.crews.iter().map(|crew| tally(crew, 0)).collect())
+    let body = &trials[0].individual.body;
+    episode.advance(body, bench.plan.steps, |_, _, _| {})?;
+    Ok(episode.crews.iter().flat_map(|crew| tallies(crew, 1)).collect())
 }
 
-/// What was measured in a lane; nothing if it is not a number.
-pub(crate) fn tally<S: Simd>(crew: &Crew<S>, lane: usize) -> Option<Tally> {
-    let tally = crew.meter.tally(lane);
-    let sane = !crew.lost.lane(lane) && tally.end.iter().all(|value| value.is_finite());
-    sane.then_some(tally)
+/// What was measured in so many lanes; nothing where it is not a number.
+fn tallies<S: Simd>(crew: &Crew<S>, lanes: usize) -> Vec<Option<Tally>> {
+    let of = |lane: usize| {
+        let tally = crew.meter.tally(lane);
+        let sane = !crew.lost.lane(lane) && tally.end.iter().all(|value| value.is_finite());
+        sane.then_some(tally)
+    };
+    (0..lanes).map(of).collect()
 }

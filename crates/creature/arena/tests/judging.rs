@@ -21,6 +21,7 @@ impl Made {
         let body = arena.body();
         let (parts, joints) = (body.parts().len(), body.driven().len());
         let mut rollout = Rollout {
+            body: body.clone().into(),
             dt: DT,
             poses: vec![0.0; (STEPS + 1) * parts * 3],
             touching: vec![false; (STEPS + 1) * parts],
@@ -170,6 +171,7 @@ fn an_idle_leg_is_named() {
 fn a_creature_without_legs_is_asked_for_all_joints_and_not_for_posture() {
     let mut rolls = Made::trot();
     rolls.arena = short("apod", "run", 2000, 3);
+    rolls.rollout.body = rolls.arena.body().clone().into();
     let body = rolls.arena.body();
     let (parts, joints) = (body.parts().len(), body.driven().len());
     let wave = |step: usize, joint: usize| 0.3 * (step as f32 * 0.2 + joint as f32).sin();

@@ -11,8 +11,10 @@
 mod body;
 mod check;
 mod description;
+mod morphology;
 mod shape;
 
 pub use body::{Body, Leg};
 pub use check::{BodyError, MOST_PARTS, Problem};
 pub use description::{Description, FORMAT_VERSION, Joint, Part, Sensor, Shape, Tag};
+pub use morphology::{Morphology, MorphologyError};

@@ -72,6 +72,20 @@ impl Shape {
         }
     }
 
+    /// The same outline, so many times as large.
+    pub fn scaled(&self, by: f32) -> Shape {
+        match self {
+            Shape::Box { width, height } => Shape::Box { width: by * width, height: by * height },
+            Shape::Circle { radius } => Shape::Circle { radius: by * radius },
+            Shape::Capsule { length, radius } => {
+                Shape::Capsule { length: by * length, radius: by * radius }
+            }
+            Shape::Polygon { points } => {
+                Shape::Polygon { points: points.iter().map(|[x, y]| [by * x, by * y]).collect() }
+            }
+        }
+    }
+
     /// Corners around which the outline lies, counter-clockwise, and its distance from their hull:
     /// a circle is one point with its radius.
     pub fn hull(&self) -> (Vec<[f32; 2]>, f32) {

@@ -114,6 +114,17 @@ impl Physics {
         1.0 / self.rate
     }
 
+    /// Physics a little different: times those factors, as far as each may go.
+    pub fn scaled(self, friction: f32, mass: f32, torque: f32, rate: f32) -> Self {
+        Self {
+            friction_scale: (self.friction_scale * friction).min(10.0),
+            mass_scale: (self.mass_scale * mass).clamp(0.1, 10.0),
+            torque_scale: (self.torque_scale * torque).min(10.0),
+            rate: (self.rate * rate).clamp(10.0, 1000.0),
+            ..self
+        }
+    }
+
     /// # Errors
     /// The first setting that is out of range.
     pub fn check(&self) -> Result<(), PhysicsError> {
