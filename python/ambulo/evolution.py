@@ -5,6 +5,7 @@
     history.jsonl    a line a generation
     champions/       a controller for every improvement, by generation
     best.safetensors the newest of them
+    evolved.json     where bodies evolve: its creature
     archive/         of MAP-Elites: a controller for every kind of motion, when the search ends
     checkpoint.json  everything that is needed to go on, renewed every generation
 
@@ -51,12 +52,16 @@ class Generation:
     """Mean of those that are numbers."""
     steps: int
     """Steps of its episodes."""
+    ahead: int
+    """How many lessons were ahead of the task itself."""
     best_so_far: float
     """Fitness of the champion, in an episode of full length; NaN before there is one."""
     seconds: float
     """Spent on the search up to now, breaks not counted."""
     improved: bool
     """Whether there is a new champion."""
+    learned: bool
+    """Whether a lesson was learned with it."""
     restarted: bool
     """Whether the search began anew after it."""
 
@@ -109,7 +114,9 @@ class Evolution:
         """
         run = cls(folder, creature, Arena(creature, json.dumps(settings)))
         folder.mkdir(parents=True, exist_ok=True)
-        names = ("run.json", "checkpoint.json", "history.jsonl", "best.safetensors")
+        names = (
+            "run.json", "checkpoint.json", "history.jsonl", "best.safetensors", "evolved.json"
+        )  # fmt: skip
         for name in names:
             (folder / name).unlink(missing_ok=True)
         run._forget(after=-1)
@@ -193,8 +200,8 @@ class Evolution:
         """
         self._go_on()
         began = time.perf_counter()
-        genomes, steps = self.search.ask(), self.search.steps(self.arena)
-        scores = executor(genomes, steps)
+        genomes, how = self.search.ask(), self.search.round(self.arena)
+        scores = executor(genomes, how)
         told = self.search.tell(self.arena, scores, threads or default_threads())
         line: dict[str, Any] = {
             "generation": self.generation,
@@ -202,12 +209,15 @@ class Evolution:
             "mean": _number(told["mean"]),
             "steps": told["steps"],
         }
-        if told["restarted"]:
-            line["restarted"] = True
+        if told["ahead"]:
+            line["ahead"] = told["ahead"]
+        for event in ("learned", "restarted"):
+            if told[event]:
+                line[event] = True
         champion = self.champion
         if told["crowned"]:
             assert champion is not None
-            self._check(champion, genomes, scores, steps)
+            self._check(champion, genomes, scores, how)
             line["champion"] = f"champions/{_champion(self.generation)}"
             line["terms"] = self._crown(champion)
             if champion.robustness is not None:
@@ -224,9 +234,11 @@ class Evolution:
             best=told["best"],
             mean=told["mean"],
             steps=told["steps"],
+            ahead=told["ahead"],
             best_so_far=best_so_far,
             seconds=self.seconds,
             improved=told["crowned"],
+            learned=told["learned"],
             restarted=told["restarted"],
         )
 
@@ -273,11 +285,11 @@ class Evolution:
         champion: Champion,
         genomes: NDArray[np.float32],
         scores: NDArray[np.float64],
-        steps: int,
+        how: str,
     ) -> None:
         """Whether a new champion does here what it did where it was tried."""
         index = int(np.argmax((genomes == champion.genome).all(1)))
-        found, (again,) = scores[index], self.arena.evaluate(champion.genome[None], 1, steps)
+        found, (again,) = scores[index], self.arena.try_round(champion.genome[None], how, 1)
         if not np.array_equal(again, found):
             raise RuntimeError(
                 f"a champion's replay reached {again.tolist()} and not {found.tolist()}: please "
@@ -292,6 +304,8 @@ class Evolution:
         for target in (path, self.folder / "best.safetensors"):
             with replacing(target) as part:
                 part.write_bytes(content)
+        if "body" in self.settings:
+            _write(self.folder / "evolved.json", self.arena.creature_of(champion.genome).json())
         return terms
 
     def _controller(self, champion: Champion, terms: dict[str, float]) -> bytes:
@@ -310,11 +324,13 @@ class Evolution:
             "source": f"evolved: {self.settings['task']['name']}",
             "seed": str(self.settings["seed"]),
         }
+        # The file holds the creature that has evolved, so there is nothing left to evolve of it.
+        arena = {name: value for name, value in self.settings.items() if name != "body"}
         return self.arena.controller(
             champion.genome,
             LICENCE,
             json.dumps(provenance),
-            json.dumps({"arena": self.settings, "record": record}),
+            json.dumps({"arena": arena, "record": record}),
         )
 
     def write_archive(self) -> list[Path]:
@@ -361,16 +377,19 @@ class Evolution:
 def read_history(folder: Path) -> list[dict[str, Any]]:
     """A run's generations: generation, best, mean, steps, best_so_far, seconds.
 
-    After those that were the last of their search restarted; of champions also champion (their
-    file), terms and, where they are chosen on replays, robustness and good.
+    Before the task itself also ahead, the lessons up to it; of the last of a lesson learned, of the
+    last of a search restarted; of champions champion (their file), terms and, where they are chosen
+    on replays, robustness and good.
     """
     lines = (folder / "history.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
     # A run that goes on, or was killed, may be in the middle of its last line.
     return [json.loads(line) for line in lines if line.endswith("\n")]
 
 
-def population_of(folder: Path) -> tuple[int, NDArray[np.float32]]:
-    """The generation, from 1, that a run would try next: (N, G). Nothing of the run is changed.
+def population_of(folder: Path) -> tuple[int, Arena, NDArray[np.float32]]:
+    """The generation, from 1, that a run would try next, where, and its genomes (N, G).
+
+    Nothing of the run is changed.
 
     Raises:
         RunError: no run, or one that cannot go on.
@@ -378,7 +397,7 @@ def population_of(folder: Path) -> tuple[int, NDArray[np.float32]]:
     if not Evolution.exists(folder):
         raise RunError(f"{folder} holds no run")
     run = Evolution.resume(folder)
-    return run.generation + 1, run.search.ask()
+    return run.generation + 1, run.arena, run.search.ask()
 
 
 def champion_at(folder: Path, generation: int) -> Path | None:

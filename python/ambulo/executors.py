@@ -1,8 +1,8 @@
 """Where genomes are tried: on this machine's threads, or on a Ray cluster.
 
-An executor takes genomes (N, G) and the steps of their episodes, and gives their scores (N, 4) as
-`Arena.evaluate` does. All give the same numbers to the last bit: a score depends on the genome and
-the steps alone.
+An executor takes genomes (N, G) and the round that they are tried in, as `Search.round` tells it,
+and gives their scores (N, 4) as `Arena.try_round` does. All give the same numbers to the last bit:
+a score depends on the genome and the round alone.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ambulo._core import Arena, Creature
 
-Executor = Callable[[NDArray[np.float32], int], NDArray[np.float64]]
+Executor = Callable[[NDArray[np.float32], str], NDArray[np.float64]]
 
 
 def default_threads() -> int:
@@ -31,14 +31,14 @@ def default_threads() -> int:
 def on_threads(arena: Arena, threads: int | None = None) -> Executor:
     """Tries genomes on so many threads; all processors by default."""
     count = threads or default_threads()
-    return lambda genomes, steps: arena.evaluate(genomes, count, steps)
+    return lambda genomes, how: arena.try_round(genomes, how, count)
 
 
 def _share(
-    creature: str, settings: str, genomes: NDArray[np.float32], steps: int
+    creature: str, settings: str, genomes: NDArray[np.float32], how: str
 ) -> NDArray[np.float64]:
     """One worker's part; creature and settings as text, so that any process can do it."""
-    return Arena(Creature.parse(creature), settings).evaluate(genomes, 1, steps)
+    return Arena(Creature.parse(creature), settings).try_round(genomes, how, 1)
 
 
 def check_ray(address: str | None = None) -> None:
@@ -87,10 +87,10 @@ def on_ray(creature: Creature, arena: Arena, address: str | None = None) -> Iter
         task = ray.remote(max_retries=3)(_share)
         text = (creature.json(), arena.settings())
 
-        def evaluate(genomes: NDArray[np.float32], steps: int) -> NDArray[np.float64]:
+        def evaluate(genomes: NDArray[np.float32], how: str) -> NDArray[np.float64]:
             workers = max(int(ray.cluster_resources().get("CPU", 1)), 1)
             shares = np.array_split(genomes, min(workers, len(genomes)))
-            return np.concatenate(ray.get([task.remote(*text, share, steps) for share in shares]))
+            return np.concatenate(ray.get([task.remote(*text, share, how) for share in shares]))
 
         yield evaluate
     finally:

@@ -125,8 +125,8 @@ def test_what_is_not_finite_is_never_a_champion(bad: float, tmp_path: Path) -> N
     honest = on_threads(run.arena, 1)
     expected: list[float] = []
 
-    def spoiled(genomes: NDArray[np.float32], steps: int) -> NDArray[np.float64]:
-        scores = honest(genomes, steps)
+    def spoiled(genomes: NDArray[np.float32], how: str) -> NDArray[np.float64]:
+        scores = honest(genomes, how)
         fitness = scores[:, 0]
         # Whoever is best is not a number, and the first, which argmax takes if all are equal.
         fitness[[0, int(np.argmax(fitness))]] = bad
@@ -141,7 +141,7 @@ def test_what_is_not_finite_is_never_a_champion(bad: float, tmp_path: Path) -> N
     assert load_controller(run.folder).record["fitness"] == max(expected)
 
 
-def nothing(genomes: NDArray[np.float32], _: int) -> NDArray[np.float64]:
+def nothing(genomes: NDArray[np.float32], _: str) -> NDArray[np.float64]:
     """An executor with which nothing comes of any."""
     return np.full((len(genomes), 4), np.nan)
 
@@ -557,7 +557,7 @@ def test_the_report(small_config: Path, tmp_path: Path) -> None:
     assert report.pop("seconds") > 0.0
     assert report == {
         "run": str(folder), "creature": "Biped 1", "task": "run", "seed": 3, "generations": 6,
-        "resumed_from": None, "restarts": 0, "fitness": best["fitness"],
+        "resumed_from": None, "restarts": 0, "lessons_ahead": 0, "fitness": best["fitness"],
         "champion_generation": best["generation"], "champion": str(folder / "best.safetensors"),
         "robustness": None, "good": None, "reached": None, "archive": None,
     }  # fmt: skip

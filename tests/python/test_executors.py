@@ -34,16 +34,17 @@ def arena(population: int = 10) -> Arena:
 @pytest.mark.parametrize("population", [3, 7, 8, 9, 25])
 def test_scores_do_not_depend_on_threads_nor_on_who_is_beside(population: int) -> None:
     here = arena(population)
-    genomes = here.search().ask()
+    genomes, how = here.search().ask(), here.search().round(here)
     fitness = np.array([here.score(genome)[0] for genome in genomes])
     alone = np.concatenate([here.evaluate(genome[None], 1) for genome in genomes])
     assert alone.shape == (population, 4) and alone[:, 0].tolist() == fitness.tolist()
     assert fitness.std() > 0.0 and (alone[:, 1] == 1.0).all()
     assert ((alone[:, 2:] >= 0.0) & (alone[:, 2:] <= 1.0)).all()
     for threads in (1, 2, 3, 64, None):
-        assert on_threads(here, threads)(genomes, 60).tolist() == alone.tolist()
-    assert on_threads(here)(genomes[::-1].copy(), 60).tolist() == alone[::-1].tolist()
-    assert (on_threads(here)(genomes, 30)[:, 0] != fitness).any()
+        assert on_threads(here, threads)(genomes, how).tolist() == alone.tolist()
+    assert on_threads(here)(genomes[::-1].copy(), how).tolist() == alone[::-1].tolist()
+    shorter = json.dumps(json.loads(how) | {"steps": 30})
+    assert (on_threads(here)(genomes, shorter)[:, 0] != fitness).any()
 
 
 def lanes_here() -> list[int]:
@@ -76,18 +77,18 @@ def test_a_number_of_lanes_that_no_machine_has_is_refused(lanes: int) -> None:
 
 def test_all_processors_are_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
     assert default_threads() >= 1
-    asked: list[tuple[int, int]] = []
+    asked: list[tuple[int, str]] = []
 
     class Noting:
-        def evaluate(self, genomes: object, threads: int, steps: int) -> object:
-            asked.append((threads, steps))
+        def try_round(self, genomes: object, how: str, threads: int) -> object:
+            asked.append((threads, how))
             return genomes
 
     monkeypatch.setattr(executors, "default_threads", lambda: 5)
     noting: Any = Noting()
-    on_threads(noting)(np.zeros((1, 1), np.float32), 7)
-    on_threads(noting, 3)(np.zeros((1, 1), np.float32), 8)
-    assert asked == [(5, 7), (3, 8)]
+    on_threads(noting)(np.zeros((1, 1), np.float32), "first")
+    on_threads(noting, 3)(np.zeros((1, 1), np.float32), "second")
+    assert asked == [(5, "first"), (3, "second")]
 
 
 # -- Ray, or none -----------------------------------------------------------------------------
@@ -170,20 +171,22 @@ executors.default_threads = lambda: 2
 creature = load_creature("tetrapod1")
 arena = Arena(creature, settings)
 genomes = arena.search().ask()
+how = arena.search().round(arena)
+short = json.dumps(json.loads(how) | {"steps": 30})
 command = ["evolve", "biped1", "run", "--config", config, "--executor", "ray", "-o"]
 with executors.on_ray(creature, arena) as tried:
     workers = ray.cluster_resources()["CPU"]
-    spread = [tried(genomes, 60).tolist(), tried(genomes[:1], 30).tolist()]
+    spread = [tried(genomes, how).tolist(), tried(genomes[:1], short).tolist()]
     # One cluster for all who want one: this does not end it.
     inside = CliRunner().invoke(cli, [*command, folder + "/inside"])
-    still = ray.is_initialized() and tried(genomes[:1], 30).tolist() == spread[1]
+    still = ray.is_initialized() and tried(genomes[:1], short).tolist() == spread[1]
     address = ray.get_runtime_context().gcs_address
     outside = subprocess.run(
         [sys.executable, "-m", "ambulo", *command, folder + "/outside", "--ray-address", address],
         capture_output=True, text=True,
     )
 on_threads = executors.on_threads(arena, 2)
-threads = [on_threads(genomes, 60).tolist(), on_threads(genomes[:1], 30).tolist()]
+threads = [on_threads(genomes, how).tolist(), on_threads(genomes[:1], short).tolist()]
 print(json.dumps({
     "workers": workers, "spread": spread, "threads": threads, "still": still,
     "inside": [inside.exit_code, inside.output],

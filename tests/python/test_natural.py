@@ -212,14 +212,17 @@ def test_a_search_is_told_a_score_of_four_numbers_for_each_genome() -> None:
     arena = Arena(load_creature("biped1"), json.dumps(SMALL))
     search = arena.search()
     genomes, before = search.ask(), search.state()
-    scores = arena.evaluate(genomes, 1)
+    how = json.loads(search.round(arena))
+    assert how == {"ahead": 0, "steps": 60, "draw": None}
+    scores = arena.try_round(genomes, json.dumps(how), 1)
+    assert scores.tolist() == arena.evaluate(genomes, 1).tolist()
     with pytest.raises(ValueError, match="4 numbers each are expected"):
         search.tell(arena, scores[:, :3].copy(), 1)
     with pytest.raises(ValueError, match=f"{len(genomes)}"):
         search.tell(arena, scores[1:], 1)
     assert search.state() == before
     told = search.tell(arena, scores, 1)
-    assert told["best"] == scores[:, 0].max() and told["steps"] == search.steps(arena) == 60
+    assert told["best"] == scores[:, 0].max() and told["steps"] == how["steps"] == 60
     assert told["mean"] == pytest.approx(scores[:, 0].mean())
     # At once, it is the same.
     other: Search = arena.search()

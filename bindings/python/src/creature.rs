@@ -89,6 +89,13 @@ impl Arena {
     }
 }
 
+/// Scores as rows: fitness, share before a fall, two numbers of the kind of motion.
+fn rows_of(py: Python<'_>, scores: Vec<arena::Score>) -> Bound<'_, PyArray2<f64>> {
+    let row =
+        |score: arena::Score| [score.fitness, score.alive, score.behaviour[0], score.behaviour[1]];
+    Recorded::rows(py, scores.into_iter().flat_map(row).collect(), 4)
+}
+
 fn by_name(terms: &arena::Terms) -> BTreeMap<&'static str, f64> {
     terms.iter().map(|(term, value)| (term.name(), *value)).collect()
 }
@@ -167,11 +174,27 @@ impl Arena {
         let genomes = self.genomes(&array);
         let steps = steps.unwrap_or(self.arena.steps());
         let scores = py.detach(|| self.arena.evaluate(&genomes, steps, threads));
-        let row = |score: arena::Score| {
-            [score.fitness, score.alive, score.behaviour[0], score.behaviour[1]]
-        };
-        let rows: Vec<f64> = scores.map_err(value_error)?.into_iter().flat_map(row).collect();
-        Ok(Recorded::rows(py, rows, 4))
+        Ok(rows_of(py, scores.map_err(value_error)?))
+    }
+
+    /// The same in a round of a search, JSON text as `Search.round` gives it.
+    fn try_round<'py>(
+        &self,
+        py: Python<'py>,
+        array: PyReadonlyArray2<'py, f32>,
+        round: &str,
+        threads: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let genomes = self.genomes(&array);
+        let round = serde_json::from_str(round).map_err(value_error)?;
+        let scores = py.detach(|| self.arena.try_round(&genomes, round, threads));
+        Ok(rows_of(py, scores.map_err(value_error)?))
+    }
+
+    /// The creature that a genome means: the arena's, or where bodies evolve one with other measures.
+    fn creature_of(&self, genome: PyReadonlyArray1<'_, f32>) -> PyResult<Creature> {
+        let body = self.arena.body_of(&self.genome(&genome.as_array().to_vec()));
+        Ok(Creature { body: (*body.map_err(value_error)?).clone() })
     }
 
     /// How each genome's motion holds up under other physics, as JSON text.
@@ -215,7 +238,7 @@ impl Arena {
         serde_json::to_string(&self.arena.judge(&recorded.rollout)).map_err(value_error)
     }
 
-    /// A controller's file: bytes. `provenance` is JSON text of strings by key, `parts` of anything.
+    /// A controller's file, of the creature that the genome means: bytes. `provenance` is JSON text of strings by key, `parts` of anything.
     fn controller<'py>(
         &self,
         py: Python<'py>,
@@ -224,12 +247,13 @@ impl Arena {
         provenance: &str,
         parts: &str,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let pilot =
-            self.arena.pilot(&self.genome(&genome.as_array().to_vec())).map_err(value_error)?;
+        let genome = self.genome(&genome.as_array().to_vec());
+        let pilot = self.arena.pilot(&genome).map_err(value_error)?;
+        let body = self.arena.body_of(&genome).map_err(value_error)?;
         let provenance = serde_json::from_str(provenance).map_err(value_error)?;
         let parts = serde_json::from_str(parts).map_err(value_error)?;
         let rate = f64::from(self.arena.settings().world.rate);
-        let bytes = pilot.to_bytes(self.arena.body(), rate, licence, provenance, parts);
+        let bytes = pilot.to_bytes(&body, rate, licence, provenance, parts);
         Ok(PyBytes::new(py, &bytes.map_err(value_error)?))
     }
 }
@@ -326,7 +350,9 @@ fn told<'py>(py: Python<'py>, told: arena::Told) -> PyResult<Bound<'py, PyDict>>
     dict.set_item("best", told.best)?;
     dict.set_item("mean", told.mean)?;
     dict.set_item("steps", told.steps)?;
+    dict.set_item("ahead", told.ahead)?;
     dict.set_item("crowned", told.crowned)?;
+    dict.set_item("learned", told.learned)?;
     dict.set_item("restarted", told.restarted)?;
     Ok(dict)
 }
@@ -363,13 +389,19 @@ impl Search {
         Recorded::rows(py, genomes.iter().flat_map(row).collect(), longest)
     }
 
-    /// In episodes of how many steps.
-    fn steps(&self, arena: &Arena) -> u32 {
-        self.search.steps(&arena.arena)
+    /// How they are tried, for `Arena.try_round`: JSON text.
+    fn round(&self, arena: &Arena) -> PyResult<String> {
+        serde_json::to_string(&self.search.round(&arena.arena)).map_err(value_error)
     }
 
-    /// Takes the scores of the genomes that it asked for, (N, 4) as `Arena.evaluate` gives them; the
-    /// next generation is made. Gives best, mean, steps, crowned, restarted.
+    /// How many lessons are ahead of the task itself.
+    #[getter]
+    fn ahead(&self) -> usize {
+        self.search.ahead()
+    }
+
+    /// Takes the scores of the genomes that it asked for, (N, 4) as `Arena.try_round` gives them; the
+    /// next generation is made. Gives best, mean, steps, ahead, crowned, learned, restarted.
     fn tell<'py>(
         &mut self,
         py: Python<'py>,

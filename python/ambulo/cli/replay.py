@@ -194,18 +194,18 @@ def _pictures(
 
 def _population(path: Path, run: Path, saved: SavedController) -> Path:
     """Everyone of the run's newest generation, half-transparent, where its episode ends."""
-    arena = Arena(saved.creature, json.dumps(saved.settings))
-    generation, genomes = population_of(run)
+    generation, arena, genomes = population_of(run)
     recordings = []
     with bar("replaying", len(genomes), "individuals") as progress:
         for genome in genomes:
             recordings.append(arena.record(genome, arena.steps))
             progress(len(recordings))
     poses = np.stack([recording.poses()[-1] for recording in recordings])
+    creatures = [description(arena.creature_of(genome)) for genome in genomes]
+    fitness = arena.evaluate(genomes, default_threads())[:, 0]
     title = f"{saved.creature.facts()['name']}, generation {generation}"
     return write_training_picture(
-        path, description(saved.creature), poses, arena.evaluate(genomes, default_threads())[:, 0],
-        recordings[0].ground(), title,
+        path, creatures, poses, fitness, recordings[0].ground(), title
     )  # fmt: skip
 
 

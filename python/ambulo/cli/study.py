@@ -122,6 +122,11 @@ def seed_2d(
     help="A file or the name of one that ships; may be given again. Default: the seed's seven.",
 )  # fmt: skip
 @click.option(
+    "--task", "tasks", multiple=True,
+    type=click.Choice(list(dict.fromkeys(row.task for row in how_soon.ROWS))),
+    help="Only this one; may be given again. Default: all.",
+)  # fmt: skip
+@click.option(
     "--seeds", default=3, show_default=True, type=click.IntRange(1, 1000), help="1 to this."
 )
 @click.option(
@@ -130,22 +135,29 @@ def seed_2d(
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the totals as JSON.")
 def gaits(
-    output: Path, creatures: tuple[str, ...], seeds: int, seconds: float, as_json: bool
+    output: Path,
+    creatures: tuple[str, ...],
+    tasks: tuple[str, ...],
+    seeds: int,
+    seconds: float,
+    as_json: bool,
 ) -> None:
-    """How soon creatures run and jump: usable, robust, good; the seed's minutes beside it.
+    """How soon creatures learn: usable, robust, good; the seed's minutes beside it.
 
     Every creature and task with default settings on one thread, and running with the seed's
-    network; champions are played in Box2D, too. Ctrl-C stops and writes what there is.
+    network, under drawn physics and with a body that evolves; champions are played in Box2D, too.
+    Ctrl-C stops and writes what there is.
 
     \b
     Examples:
       ambulo study gaits -o out/gaits
-      ambulo study gaits -o out/mine --creature my_creature.json --seeds 1
+      ambulo study gaits -o out/mine --creature my_creature.json --task run --seeds 1
     """
     names = creatures or seed_creatures()
-    with held_back() as asked_to_stop, _bar(len(how_soon.ROWS) * len(names) * seeds) as watch:
+    rows = tuple(row for row in how_soon.ROWS if not tasks or row.task in tasks)
+    with held_back() as asked_to_stop, _bar(len(rows) * len(names) * seeds) as watch:
         results = how_soon.study(
-            names, seeds=seeds, seconds=seconds, stop=asked_to_stop, watch=watch
+            names, rows=rows, seeds=seeds, seconds=seconds, stop=asked_to_stop, watch=watch
         )
         stopped = asked_to_stop()
     if not results["cases"]:

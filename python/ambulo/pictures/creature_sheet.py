@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -196,7 +196,7 @@ def _cells(
 
 def write_training_picture(
     path: str | Path,
-    creature: Mapping[str, Any],
+    creature: Mapping[str, Any] | Sequence[Mapping[str, Any]],
     poses: ArrayLike,
     fitness: ArrayLike,
     ground: ArrayLike,
@@ -206,6 +206,7 @@ def write_training_picture(
 ) -> Path:
     """Writes one PNG of a whole population, half transparent, with the best one highlighted.
 
+    `creature`: what all are, or N with parts of the same names whose measures differ.
     `poses` (N, P, 3): x, y in metres and angle of every part of each of N creatures; `fitness`
     (N,), higher is better; `ground` (N, 2): its outline from left to right in metres; `size` in
     pixels, if None 1240 wide and as high as is needed. All are in view unless they would become
@@ -214,7 +215,9 @@ def write_training_picture(
     """
     path = Path(path)
     check_size(size or CROWD)
-    body, ground = read_body(creature), check_ground(ground)
+    one = isinstance(creature, Mapping)
+    bodies = [read_body(file) for file in ([creature] if one else creature)]
+    body, ground = bodies[0], check_ground(ground)
     poses, fitness = np.asarray(poses, np.float64), np.asarray(fitness, np.float64)
     if poses.ndim != 3 or not len(poses) or poses.shape[1:] != (len(body.parts), 3):
         raise ValueError(
@@ -227,8 +230,12 @@ def write_training_picture(
         raise ValueError(
             f"fitness must have one number a creature ({len(poses)}), not shape {fitness.shape}"
         )
+    bodies = bodies * len(poses) if one else bodies
+    if len(bodies) != len(poses):
+        raise ValueError(f"{len(bodies)} creatures, but poses of {len(poses)}")
     worst_first = np.argsort(np.where(np.isnan(fitness), -np.inf, fitness), kind="stable")
     best = int(worst_first[-1])
+    body = bodies[best]
     view, outside = _crowd(body, poses, best, ground, size or CROWD)
     view = view if size else _cropped(view, body, poses)
     canvas = paint_world(view, ground)
@@ -236,7 +243,7 @@ def write_training_picture(
     paint_shadow(canvas, view, body, poses[best], ground)
     alpha = float(np.clip(1.6 / np.sqrt(len(poses)), 0.10, 0.45))
     for i in worst_first[:-1]:
-        paint_body(canvas, view, body, poses[i], alpha=alpha, accent=False, dots=False)
+        paint_body(canvas, view, bodies[i], poses[i], alpha=alpha, accent=False, dots=False)
     paint_start(canvas, view, ground, ceiling=64.0 * view.unit)
     paint_body(canvas, view, body, poses[best])
     _crown(canvas, view, body, poses[best])

@@ -1,10 +1,11 @@
-"""How soon creatures learn: every creature × run and jump × seeds, beside the seed's minutes.
+"""How soon creatures learn: every creature × task × seeds, beside the seed's minutes.
 
     results.json   every case, and the totals
     README.md      the tables
 
 A case is a search as `ambulo evolve` makes it, with its default settings but for what its row says,
-stopped when the champion is good and robust or the seconds are up. Seconds are the processor's, of
+stopped when the champion is good and robust (where a task knows no good: robust) or the seconds are
+up. Seconds are the processor's, of
 one thread, champions' replays included.
 """
 
@@ -36,12 +37,20 @@ class Row:
     task: str
     settings: dict[str, Any]
     """Beside the defaults."""
+    until: str = "good"
+    """What ends a search."""
 
 
 ROWS = (
     Row("run", "run", {}),
     Row("jump", "jump", {}),
     Row("run, the seed's network", "run", {"controller": {"kind": "network"}}),
+    Row("run, `--robust`", "run", {"search": {"randomise": True}}),
+    Row("run, `--body`", "run", {"body": {}}),
+    *(
+        Row(task.replace("_", " "), task, {}, until="robust")
+        for task in ("climb", "hurdles", "holes", "rough", "keep_upright", "swim")
+    ),
 )
 
 
@@ -54,7 +63,7 @@ def case(
     search = arena.search()
     reached: dict[str, float | None] = dict.fromkeys(LEVELS)
     began = time.process_time()
-    while reached["good"] is None and time.process_time() - began < seconds and not stop():
+    while reached[row.until] is None and time.process_time() - began < seconds and not stop():
         search.step(arena, 1)
         now = time.process_time() - began
         for level in LEVELS:
@@ -75,8 +84,9 @@ def case(
     judgement = _judged(arena, genome)
     settings["world"] = {"solver": "box2d"}
     elsewhere = _judged(Arena(creature, json.dumps(settings)), genome)
-    measure = "distance" if row.task == "run" else "gain"
-    kept = elsewhere[measure] / judgement[measure] if judgement["usable"] else None
+    measure = "gain" if row.task == "jump" else "distance"
+    compared = judgement["usable"] and row.task != "keep_upright"
+    kept = elsewhere[measure] / judgement[measure] if compared else None
     return found | {
         "judgement": judgement,
         "box2d": {"usable": elsewhere["usable"], "kept": kept, "reasons": elsewhere["reasons"]},
@@ -92,6 +102,7 @@ def _judged(arena: Arena, genome: Any) -> dict[str, Any]:
 def study(
     creatures: tuple[str, ...],
     *,
+    rows: tuple[Row, ...] = ROWS,
     seeds: int,
     seconds: float,
     stop: Callable[[], bool],
@@ -99,7 +110,7 @@ def study(
 ) -> dict[str, Any]:
     """All cases; those that a stop has kept from being are missing."""
     cases: list[dict[str, Any]] = []
-    for row in ROWS:
+    for row in rows:
         for name in creatures:
             for seed in range(1, seeds + 1):
                 if stop():
@@ -111,7 +122,7 @@ def study(
         "seeds": seeds,
         "seconds": seconds,
         "creatures": list(creatures),
-        "totals": [total for row in ROWS if (total := _total(row, cases)) is not None],
+        "totals": [total for row in rows if (total := _total(row, cases)) is not None],
         "cases": cases,
     }
 
@@ -123,7 +134,7 @@ def _total(row: Row, cases: list[dict[str, Any]]) -> dict[str, Any] | None:
     times = {level: [case["seconds"][level] for case in mine] for level in LEVELS}
     reached = {level: [t for t in found if t is not None] for level, found in times.items()}
     usable = [case for case in mine if case["judgement"] and case["judgement"]["usable"]]
-    kept = [case["box2d"]["kept"] for case in usable]
+    kept = [kept for case in usable if (kept := case["box2d"]["kept"]) is not None]
     regular = [
         case for case in usable
         if case["judgement"]["regularity"] and case["judgement"]["regularity"] > 0.9
@@ -144,7 +155,9 @@ def _total(row: Row, cases: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 
 def minutes_of_the_seed(creature: str, task: str) -> str:
-    """When the seed's own champion was usable, in its minutes."""
+    """When the seed's own champion was usable, in its minutes; a dash for what it has not."""
+    if (creature, task) not in {(case.creature, case.task) for case in PUBLISHED.cases}:
+        return "–"
     published = PUBLISHED.case(creature, task)
     for mark in published.marks:
         if mark.usable:
@@ -191,7 +204,7 @@ def _of(total: dict[str, Any], level: str) -> str:
 
 
 def _cases(row: Row, cases: list[dict[str, Any]]) -> list[str]:
-    what = "body lengths/s" if row.task == "run" else "rise, of what is needed"
+    what = "rise, of what is needed" if row.task == "jump" else "body lengths/s"
     lines = [
         f"| creature | the seed, usable after | seed | usable | robust | good | {what} | "
         "regularity | cost of transport | in Box2D |",
@@ -206,7 +219,7 @@ def _cases(row: Row, cases: list[dict[str, Any]]) -> list[str]:
         if judgement is None:
             figures = ["–"] * 4
         else:
-            jump = row.task == "jump"
+            jump, still = row.task == "jump", row.task == "keep_upright"
             speed = (
                 judgement["gain"] / judgement["gain_needed"] if jump else judgement["speed_bl_s"]
             )
@@ -215,19 +228,20 @@ def _cases(row: Row, cases: list[dict[str, Any]]) -> list[str]:
                 kept += f", {100.0 * box2d['kept']:.0f} %"
             regularity, cost = judgement["regularity"], judgement["cost_of_transport"]
             figures = [
-                f"{speed:.2f}",
-                "–" if jump or regularity is None else f"{regularity:.2f}",
-                "–" if jump or cost is None else f"{cost:.2f}",
+                "–" if still else f"{speed:.2f}",
+                "–" if jump or still or regularity is None else f"{regularity:.2f}",
+                "–" if jump or still or cost is None else f"{cost:.2f}",
                 kept,
             ]
-        published = minutes_of_the_seed(name, row.task) if _is_published(name) else "–"
-        cells = [case["creature"], published, str(case["seed"]), *seconds, *figures]
+        cells = [
+            case["creature"],
+            minutes_of_the_seed(name, row.task),
+            str(case["seed"]),
+            *seconds,
+            *figures,
+        ]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
-
-
-def _is_published(name: str) -> bool:
-    return any(case.creature == name for case in PUBLISHED.cases)
 
 
 def write(folder: Path, results: dict[str, Any]) -> list[Path]:

@@ -73,9 +73,8 @@ impl<S: Simd> Crew<S> {
             let every = (PUSH_EVERY / dt.lane(lane)) as u32;
             seed.map(|seed| (every.max(1), Random::new(seed)))
         };
-        let Plan { steps, falls, series, .. } = plan;
         Self {
-            meter: Meter::new(simd, bodies, dt, torso, &touching, steps, falls, series),
+            meter: Meter::new(simd, bodies, dt, torso, &touching, plan),
             felt,
             touching,
             torques: vec![zero; if plan.torques { joints } else { 0 }],

@@ -5,6 +5,7 @@ use ambulo_lanes::{Lanes, Mask, Scalar, math};
 use ambulo_world::Physics;
 use serde::Serialize;
 
+use crate::episode::Plan;
 use crate::measures::{regularity, spectral_arc_length, symmetry};
 use crate::meter::{Look, Meter, Tally};
 use crate::{Arena, Rollout};
@@ -220,8 +221,8 @@ fn measured(body: &Body, rollout: &Rollout) -> Tally {
     };
     let (steps, dt) = (rollout.steps(), Lanes::from(rollout.dt));
     let start = rollout.torso[0].map(Lanes::from);
-    let mut meter =
-        Meter::new(Scalar, &[body], dt, start, &touching(0), steps as u32, false, false);
+    let plan = Plan { steps: steps as u32, ..Plan::JUDGED };
+    let mut meter = Meter::new(Scalar, &[body], dt, start, &touching(0), plan);
     for step in 1..=steps {
         let row = |values: &[f32], step: usize| lanes(&values[step * joints..(step + 1) * joints]);
         let (now, before) = (row(&rollout.angles, step), row(&rollout.angles, step - 1));

@@ -4,6 +4,7 @@
 use ambulo_body::Body;
 use ambulo_lanes::{Lanes, Mask, Simd, math};
 
+use crate::episode::Plan;
 use crate::measures;
 
 /// The time at the end of an episode in which a jumper must stand, seconds.
@@ -127,18 +128,17 @@ pub(crate) struct Meter<S: Simd> {
 }
 
 impl<S: Simd> Meter<S> {
-    /// Of episodes of so many steps; `bodies`: one for each lane, or for all; `start`: where the torso's centre is in the start pose; `falls`:
-    /// whether a fall ends one; `series`: whether the joints' angles are kept.
+    /// Of episodes that go so; `bodies`: one for each lane, or for all; `start`: where the torso's
+    /// centre is in the start pose.
     pub fn new(
         simd: S,
         bodies: &[&Body],
         dt: Lanes<S>,
         start: [Lanes<S>; 2],
         touching: &[Mask<S>],
-        steps: u32,
-        falls: bool,
-        series: bool,
+        plan: Plan,
     ) -> Self {
+        let Plan { steps, falls, series, .. } = plan;
         let (zero, one) = (dt.like(0.0), dt.like(1.0));
         let never = zero.less(zero);
         let body = bodies[0];

@@ -202,6 +202,7 @@ impl Settings {
         };
         range("search.trials", search.trials.expect("said") as u64, 0, 1000)?;
         range("search.patience", search.patience.expect("said"), 0, 1_000_000)?;
+        range("curriculum", self.curriculum.len() as u64, 0, 100)?;
         if !self.curriculum.is_empty() && search.trials == Some(0) {
             return Err(ArenaError::Settings(
                 "curriculum: its lessons end by champions chosen on replays, but search.trials is 0"
