@@ -86,7 +86,7 @@ fn a_stored_search_goes_on_as_if_nothing_had_been() {
 
 #[test]
 fn stages_grow_when_the_best_does_not_fall() {
-    let arena = natural(starter("tetrapod2"), SMALL);
+    let arena = natural(starter("tetrapod2"), &SMALL.replace("\"patience\": 2", "\"patience\": 0"));
     assert_eq!(arena.stages(), [60, 120, 240]);
     let mut search = Evolution::new(&arena).unwrap();
     let mut seen = Vec::new();

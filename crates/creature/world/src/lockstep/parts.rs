@@ -6,8 +6,8 @@ use ambulo_lanes::{Lanes, Simd};
 use crate::Physics;
 use crate::world::turn;
 
-/// Stiffness, hertz, and damping ratio of joints: Box2D's. Stiffer ones (120, 1) halve the mean gap,
-/// but not the widest, and what comes back of an impact is four times as much.
+/// Stiffness, hertz, and damping ratio of joints: Box2D's. Of stiffer ones (120, 1) four times as much
+/// of an impact comes back; wide gaps are closed after the step.
 const JOINT: [f32; 2] = [60.0, 2.0];
 /// The same of the ground: twice Box2D's stiffness, as nothing lies on anything that lies on it.
 const CONTACT: [f32; 2] = [120.0, 10.0];
@@ -92,6 +92,19 @@ impl<S: Simd> Rigid<S> {
         self.vx = c * along - s * across;
         self.vy = s * along + c * across;
         self.w = self.w / (one + self.drag[2] * self.w.abs() * self.inverse_inertia);
+    }
+
+    /// Moves and turns as an impulse at `arm` from the centre would in a unit of time, by little.
+    #[inline(always)]
+    pub fn shift(&mut self, [px, py]: [Lanes<S>; 2], [rx, ry]: [Lanes<S>; 2]) {
+        self.dx += self.inverse_mass * px;
+        self.dy += self.inverse_mass * py;
+        let turn = self.inverse_inertia * (rx * py - ry * px);
+        self.angle += turn;
+        // What does not turn keeps its bits; lengths are mended in the next sub-step.
+        let (c, s) = (self.cos, self.sin);
+        self.cos = c - turn * (s + turn * c * 0.5);
+        self.sin = s + turn * (c - turn * s * 0.5);
     }
 
     /// Moves on by a sub-step of `h` seconds.

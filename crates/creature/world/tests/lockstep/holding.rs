@@ -19,20 +19,15 @@ fn cm(hundredths: f64, seen: &[&Seen], what: fn(&Seen) -> &[f32]) -> f32 {
     100.0 * most_of(hundredths, seen.iter().flat_map(|seen| what(seen).iter().copied()))
 }
 
-/// Joints are as soft as Box2D's and gape as much: the heavier the body on a light part, the wider.
-/// Driven as hard as their motors can, starters spend 99 % of the time with less than 2 cm at the
-/// worst of all joints (Decapod 2; most 0.4 to 1.2), at no time more than 4.9. The frog is apart with
-/// 5 and 9: it falls on an eye that weighs a hundredth of it.
+/// Driven as hard as their motors can, on any ground, at no time does any joint gape by 1 cm (0.9 at the
+/// worst). Softness alone, as Box2D has it, let them gape by 2 to 9.
 #[test]
 fn joints_hold() {
     for name in STARTERS {
         for pattern in [Pattern::Sine, Pattern::Abrupt] {
             for flat in [true, false] {
-                let seen = of(name, pattern, flat);
-                let [most, all] = [99.0, 100.0].map(|part| cm(part, &seen, |seen| &seen.gaps));
-                let [good, worst] = if name == "frog" { [6.5, 12.0] } else { [2.5, 7.0] };
-                assert!(most < good, "{name} {pattern:?} flat {flat}: {most} cm in 99 %");
-                assert!(all < worst, "{name} {pattern:?} flat {flat}: {all} cm");
+                let widest = cm(100.0, &of(name, pattern, flat), |seen| &seen.gaps);
+                assert!(widest < 1.0, "{name} {pattern:?} flat {flat}: {widest} cm");
             }
         }
     }
@@ -75,22 +70,21 @@ fn joints_gape_no_more_than_in_box2d() {
             }
         }
         assert!(ours < 1.25 * theirs, "{name}: a mean of {ours} cm, in Box2D {theirs} cm");
-        assert!(ours < 0.8, "{name}: a mean of {ours} cm");
     }
 }
 
-/// The ground gives way by less than 1 cm (mostly 0.05 to 0.4). But on flat ground a foot that a motor
-/// throws at it from more than 2 cm above, all within one step, is not seen coming: so it goes in one
-/// step in a thousand of abrupt movement, by 5 cm at most, and back in the next few. Other ground is
-/// looked at from 10 cm.
+/// The ground gives way by less than 1 cm: on flat ground in 999 of 1000 steps of smooth movement, in 99
+/// of 100 of any on any. But a foot that a motor throws at flat ground from more than 2 cm above, all
+/// within one step, is not seen coming, and closing the joints above pushes it on: it goes in by 5 cm
+/// at most, and back in the next few. Other ground is looked at from 10 cm.
 #[test]
 fn nothing_sinks_in() {
     for name in STARTERS {
         for flat in [true, false] {
             let depth = |part, pattern| cm(part, &of(name, pattern, flat), |seen| &seen.depths);
-            let sine = depth(99.9, Pattern::Sine);
-            let abrupt = depth(if flat { 99.0 } else { 99.9 }, Pattern::Abrupt);
-            assert!(sine < 1.0 && abrupt < 1.3, "{name} flat {flat}: {sine} and {abrupt} cm");
+            let sine = depth(if flat { 99.9 } else { 99.0 }, Pattern::Sine);
+            let abrupt = depth(99.0, Pattern::Abrupt);
+            assert!(sine < 1.0 && abrupt < 1.0, "{name} flat {flat}: {sine} and {abrupt} cm");
             let worst = depth(100.0, Pattern::Sine).max(depth(100.0, Pattern::Abrupt));
             assert!(worst < 9.0, "{name} flat {flat}: {worst} cm");
         }
