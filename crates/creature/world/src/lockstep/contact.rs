@@ -4,6 +4,7 @@ use ambulo_body::Body;
 use ambulo_lanes::{Lanes, Mask, Simd};
 
 use super::parts::{Rigid, Rules, Who};
+use super::sides::Sides;
 use super::terrain::Terrain;
 use crate::Physics;
 use crate::world::turn;
@@ -12,10 +13,11 @@ use crate::world::turn;
 const MARGIN: f32 = 0.02;
 /// The same on uneven ground, where solving costs little beside looking, and who is thrown through a
 /// wall within a step is not back as soon as who is thrown through a floor.
-const UNEVEN_MARGIN: f32 = 0.1;
+pub const UNEVEN_MARGIN: f32 = 0.1;
 
 /// A point of a part, with a radius around it, that the ground holds up. On uneven ground there are
-/// two for each, for the two nearest places of the ground.
+/// two for each, for the two nearest places of the ground, and two for a part's sides, of which the
+/// point is wherever a corner of the ground touches them.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner<S: Simd> {
     pub part: usize,
@@ -41,15 +43,18 @@ pub struct Corner<S: Simd> {
 }
 
 impl<S: Simd> Corner<S> {
-    /// All corners of a body.
-    pub fn all(simd: S, who: &Who<'_>, flat: bool) -> Vec<Self> {
+    /// All corners of a body, where `sides` is given (on uneven ground) with those of its sides.
+    pub fn all(simd: S, who: &Who<'_>, sides: &[Sides<S>]) -> Vec<Self> {
         let mut corners = Vec::new();
         let (body, _) = who(0);
         for part in 0..body.parts().len() {
             for corner in 0..body.parts()[part].shape.hull().0.len() {
-                let places = if flat { 1 } else { 2 };
+                let places = if sides.is_empty() { 1 } else { 2 };
                 corners.extend([Self::new(simd, part, corner, who)].repeat(places));
             }
+            let count = sides.get(part).map_or(0, |sides| sides.lying.len());
+            let side = Self { radius: Lanes::zero(simd), ..Self::new(simd, part, 0, who) };
+            corners.extend([side].repeat(count));
         }
         corners
     }
@@ -96,15 +101,21 @@ impl<S: Simd> Corner<S> {
         self.distance = body.y + self.start[1] - self.radius;
     }
 
-    /// Looks where uneven ground is, for both corners of a point.
+    /// Looks where uneven ground is, for both corners of a point at which two sides meet.
     #[inline(always)]
-    pub fn look_around(corners: &mut [Self], body: &Rigid<S>, terrain: &Terrain, rules: &Rules<S>) {
+    pub fn look_around(
+        corners: &mut [Self],
+        sides: [[Lanes<S>; 2]; 2],
+        body: &Rigid<S>,
+        terrain: &Terrain,
+        rules: &Rules<S>,
+    ) {
         let start = body.turned(corners[0].local);
         let at = [body.x + start[0], body.y + start[1]];
         // As far as a contact is prepared from, whichever way the point goes.
         let speed = (body.vx - body.w * start[1]).abs() + (body.vy + body.w * start[0]).abs();
         let reach = speed * rules.dt * 2.0 + UNEVEN_MARGIN;
-        let [(da, na), (db, nb)] = terrain.nearest(at, corners[0].radius, reach);
+        let [(da, na), (db, nb)] = terrain.nearest(at, corners[0].radius, reach, sides);
         // Each goes to the corner that pushed more in its direction: impulses of before fit.
         let [ma, mb] = [corners[0].normal, corners[1].normal];
         let (dx, dy) = (na[0] - nb[0], na[1] - nb[1]);
@@ -114,6 +125,26 @@ impl<S: Simd> Corner<S> {
             corner.distance = swap.choose(db, da);
             corner.normal = [swap.choose(nb[0], na[0]), swap.choose(nb[1], na[1])];
         }
+    }
+
+    /// A side lies on a corner of the ground, `at` from the centre of mass; `distance` is from where
+    /// the centre of mass was before the step.
+    #[inline(always)]
+    pub fn lie(
+        &mut self,
+        body: &Rigid<S>,
+        distance: Lanes<S>,
+        normal: [Lanes<S>; 2],
+        at: [Lanes<S>; 2],
+    ) {
+        self.local = body.unturned(at);
+        (self.distance, self.normal, self.start, self.arm) = (distance, normal, at, at);
+    }
+
+    /// Forgets the impulses of before where they are those of `other` contacts.
+    #[inline(always)]
+    pub fn start_over(&mut self, other: Mask<S>) {
+        (self.push, self.rub) = ((!other).keep(self.push), (!other).keep(self.rub));
     }
 
     /// Before a step: who is near enough to touch within it, and what a push there does.

@@ -4,11 +4,13 @@
 //! 2019, with the soft constraints and the relaxing pass of Catto, "Solver2D", 2024): sub-steps of
 //! one warm-started solve with soft position correction, after which a second solve without it takes
 //! out the speed that the correction added. What differs: bodies touch the ground only, at their
-//! corners; contacts look ahead as far as a point moves in a step; of a joint's two limits the nearer
-//! one is held. Lanes may differ in bodies' sizes and in all of [`Physics`] but the ground.
+//! corners and at its own; contacts look ahead as far as a point moves in a step; of a joint's two
+//! limits the nearer one is held. Lanes may differ in bodies' sizes and in all of [`Physics`] but the
+//! ground.
 
 mod contact;
 mod parts;
+mod sides;
 mod solve;
 mod terrain;
 
@@ -17,6 +19,7 @@ use ambulo_lanes::{Lanes, Mask, Simd, math};
 
 use self::contact::Corner;
 use self::parts::{Hinge, Rigid, Rules};
+use self::sides::Sides;
 use self::terrain::Terrain;
 use crate::physics::DEPTH;
 use crate::world::turn;
@@ -33,6 +36,8 @@ pub struct Lockstep<S: Simd> {
     bodies: Vec<Rigid<S>>,
     hinges: Vec<Hinge<S>>,
     corners: Vec<Corner<S>>,
+    /// Of each part; none on flat ground.
+    sides: Vec<Sides<S>>,
     rules: Rules<S>,
     substeps: u32,
     ground: Terrain,
@@ -98,17 +103,24 @@ impl<S: Simd> Lockstep<S> {
                 [axis(0), axis(1)]
             })
             .collect();
+        let flat = physics.ground == Ground::Flat;
+        let mut sides: Vec<Sides<S>> = Vec::new();
+        for part in 0..if flat { 0 } else { bodies.len() } {
+            let first = sides.last().map_or(0, |before| before.lying.end);
+            sides.push(Sides::new(simd, part, first, &who));
+        }
         let mut made = Self {
             simd,
             individuals: count,
             touching: vec![Mask::never(simd); bodies.len()],
-            corners: Corner::all(simd, &who, physics.ground == Ground::Flat),
+            corners: Corner::all(simd, &who, &sides),
+            sides,
             rules: Rules::new(simd, &who),
             bodies,
             hinges,
             substeps: physics.substeps,
             ground: Terrain::new(ground),
-            flat: physics.ground == Ground::Flat,
+            flat,
             water: physics.water.is_some(),
             ends,
             start_angles,
@@ -177,7 +189,7 @@ impl<S: Simd> Lockstep<S> {
         self.hinges.iter().map(gap).fold(0.0, f32::max)
     }
 
-    /// How deep any corner is in the ground, metres.
+    /// How deep any corner is in the ground, or one of the ground in a part, metres.
     pub fn deepest(&self, lane: usize) -> f32 {
         let depth = self.corners.iter().map(|corner| -corner.least().lane(lane));
         depth.fold(0.0, f32::max)

@@ -80,6 +80,12 @@ impl<S: Simd> Rigid<S> {
         [self.cos * x - self.sin * y, self.sin * x + self.cos * y]
     }
 
+    /// The same back.
+    #[inline(always)]
+    pub fn unturned(&self, [x, y]: [Lanes<S>; 2]) -> [Lanes<S>; 2] {
+        [self.cos * x + self.sin * y, self.cos * y - self.sin * x]
+    }
+
     /// Slows it as water does in a step: implicitly, so that it never turns back.
     #[inline(always)]
     pub fn wade(&mut self) {

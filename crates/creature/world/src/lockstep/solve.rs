@@ -45,6 +45,12 @@ impl<S: Simd> Lockstep<S> {
             for hinge in &mut self.hinges {
                 hinge.aim(&self.bodies);
             }
+            if !FLAT {
+                for sides in &self.sides {
+                    let lying = &mut self.corners[sides.lying.clone()];
+                    sides.follow(lying, &self.bodies[sides.part]);
+                }
+            }
             self.pass::<FLAT, false>(&rules);
             for hinge in &mut self.hinges {
                 hinge.account(&self.bodies);
@@ -92,9 +98,15 @@ impl<S: Simd> Lockstep<S> {
                 corner.look(&self.bodies[corner.part]);
             }
         } else {
-            for both in self.corners.chunks_exact_mut(2) {
-                let body = &self.bodies[both[0].part];
-                Corner::look_around(both, body, &self.ground, &self.rules);
+            for sides in &mut self.sides {
+                let body = &self.bodies[sides.part];
+                sides.turn(body);
+                let points = self.corners[sides.points.clone()].chunks_exact_mut(2);
+                for (point, both) in points.enumerate() {
+                    Corner::look_around(both, sides.at(point), body, &self.ground, &self.rules);
+                }
+                let lying = &mut self.corners[sides.lying.clone()];
+                sides.look(lying, body, &self.ground, &self.rules);
             }
         }
         for corner in &self.corners {

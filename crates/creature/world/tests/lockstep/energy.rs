@@ -6,7 +6,7 @@
 use ambulo_world::{Physics, Water};
 
 use crate::common::starter;
-use crate::play::{Play, STARTERS, Seen, chance, driven, measure};
+use crate::play::{Play, STARTERS, Seen, UNEVEN, chance, driven, measure, moved, on};
 
 /// How much more there is at any time than there was at most in so many steps before.
 fn gained(energy: &[f64], window: usize) -> f64 {
@@ -43,6 +43,27 @@ fn without_motors_it_does_not_grow() {
             let unit = measure(&body);
             assert!(step < 0.1 * unit, "{name}: {step} J come back at once of {unit} J");
             assert!(third < 0.002 * unit, "{name}: {third} J from nothing of {unit} J");
+        }
+    }
+}
+
+/// The same on uneven ground: at once by 0.15 at most, a third of a second later by 0.002.
+#[test]
+fn without_motors_it_does_not_grow_on_uneven_ground() {
+    for (name, ground) in STARTERS.iter().flat_map(|name| UNEVEN.map(|ground| (name, ground))) {
+        let (body, physics) =
+            (moved(&starter(name), 6.0), Physics { torque_scale: 0.0, ..on(ground) });
+        let throws = |who: usize, part: usize| {
+            let [a, b, c] = [0, 1, 2].map(|what| chance(who + 1, part, what));
+            [3.0 * a, 2.0 + b, 4.0 * c]
+        };
+        let (who, throws) = ([(&body, &physics); 16], Some(&throws as _));
+        let play = Play { who: &who, motors: &|_, _, _| 9.0, throws, steps: 400, hashes: false };
+        for seen in play.go() {
+            let [step, third] = [1, 20].map(|window| gained(&seen.energy[1..], window));
+            let unit = measure(&body);
+            assert!(step < 0.2 * unit, "{name} {ground:?}: {step} J come back at once of {unit} J");
+            assert!(third < 0.004 * unit, "{name} {ground:?}: {third} J from nothing of {unit} J");
         }
     }
 }

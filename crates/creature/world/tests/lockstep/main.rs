@@ -9,4 +9,5 @@ mod agreement;
 mod energy;
 mod ground;
 mod holding;
+mod lying;
 mod widths;
