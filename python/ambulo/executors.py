@@ -1,7 +1,7 @@
 """Where genomes are tried: on this machine's threads, or on a Ray cluster.
 
 An executor takes genomes (N, G) and the round that they are tried in, as `Search.round` tells it,
-and gives their scores (N, 4) as `Arena.try_round` does. All give the same numbers to the last bit:
+and gives their scores (N, 5) as `Arena.try_round` does. All give the same numbers to the last bit:
 a score depends on the genome and the round alone.
 """
 

@@ -143,7 +143,7 @@ def test_what_is_not_finite_is_never_a_champion(bad: float, tmp_path: Path) -> N
 
 def nothing(genomes: NDArray[np.float32], _: str) -> NDArray[np.float64]:
     """An executor with which nothing comes of any."""
-    return np.full((len(genomes), 4), np.nan)
+    return np.full((len(genomes), 5), np.nan)
 
 
 @pytest.mark.parametrize("preset", ["seed", "natural"])

@@ -37,9 +37,9 @@ def test_scores_do_not_depend_on_threads_nor_on_who_is_beside(population: int) -
     genomes, how = here.search().ask(), here.search().round(here)
     fitness = np.array([here.score(genome)[0] for genome in genomes])
     alone = np.concatenate([here.evaluate(genome[None], 1) for genome in genomes])
-    assert alone.shape == (population, 4) and alone[:, 0].tolist() == fitness.tolist()
+    assert alone.shape == (population, 5) and alone[:, 0].tolist() == fitness.tolist()
     assert fitness.std() > 0.0 and (alone[:, 1] == 1.0).all()
-    assert ((alone[:, 2:] >= 0.0) & (alone[:, 2:] <= 1.0)).all()
+    assert ((alone[:, 2:] >= 0.0) & (alone[:, 2:] <= 1.0)).all() and set(alone[:, 4]) <= {0.0, 1.0}
     for threads in (1, 2, 3, 64, None):
         assert on_threads(here, threads)(genomes, how).tolist() == alone.tolist()
     assert on_threads(here)(genomes[::-1].copy(), how).tolist() == alone[::-1].tolist()

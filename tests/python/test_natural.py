@@ -208,7 +208,7 @@ def test_a_search_of_another_arena_is_not_restored(whole: Path) -> None:
         other.restore(run.search.state())
 
 
-def test_a_search_is_told_a_score_of_four_numbers_for_each_genome() -> None:
+def test_a_search_is_told_a_score_of_five_numbers_for_each_genome() -> None:
     arena = Arena(load_creature("biped1"), json.dumps(SMALL))
     search = arena.search()
     genomes, before = search.ask(), search.state()
@@ -216,7 +216,7 @@ def test_a_search_is_told_a_score_of_four_numbers_for_each_genome() -> None:
     assert how == {"ahead": 0, "steps": 60, "draw": None}
     scores = arena.try_round(genomes, json.dumps(how), 1)
     assert scores.tolist() == arena.evaluate(genomes, 1).tolist()
-    with pytest.raises(ValueError, match="4 numbers each are expected"):
+    with pytest.raises(ValueError, match="5 numbers each are expected"):
         search.tell(arena, scores[:, :3].copy(), 1)
     with pytest.raises(ValueError, match=f"{len(genomes)}"):
         search.tell(arena, scores[1:], 1)

@@ -89,11 +89,13 @@ impl Arena {
     }
 }
 
-/// Scores as rows: fitness, share before a fall, two numbers of the kind of motion.
+/// Scores as rows: fitness, share before a fall, two numbers of the kind of motion, promising.
 fn rows_of(py: Python<'_>, scores: Vec<arena::Score>) -> Bound<'_, PyArray2<f64>> {
-    let row =
-        |score: arena::Score| [score.fitness, score.alive, score.behaviour[0], score.behaviour[1]];
-    Recorded::rows(py, scores.into_iter().flat_map(row).collect(), 4)
+    let row = |score: arena::Score| {
+        let promising = if score.promising { 1.0 } else { 0.0 };
+        [score.fitness, score.alive, score.behaviour[0], score.behaviour[1], promising]
+    };
+    Recorded::rows(py, scores.into_iter().flat_map(row).collect(), 5)
 }
 
 fn by_name(terms: &arena::Terms) -> BTreeMap<&'static str, f64> {
@@ -160,9 +162,9 @@ impl Arena {
         Ok(Search { search })
     }
 
-    /// (N, G) genomes to (N, 4) scores in episodes of so many steps (of full length if left out):
+    /// (N, G) genomes to (N, 5) scores in episodes of so many steps (of full length if left out):
     /// fitness (NaN where nothing came of it), share of the episode before a fall, two numbers that
-    /// say what kind of motion it is.
+    /// say what kind of motion it is, and 1 if it may be usable, else 0.
     #[pyo3(signature = (array, threads, steps=None))]
     fn evaluate<'py>(
         &self,
@@ -400,7 +402,7 @@ impl Search {
         self.search.ahead()
     }
 
-    /// Takes the scores of the genomes that it asked for, (N, 4) as `Arena.try_round` gives them; the
+    /// Takes the scores of the genomes that it asked for, (N, 5) as `Arena.try_round` gives them; the
     /// next generation is made. Gives best, mean, steps, ahead, crowned, learned, restarted.
     fn tell<'py>(
         &mut self,
@@ -410,13 +412,14 @@ impl Search {
         threads: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let rows = scores.as_array();
-        if rows.ncols() != 4 {
-            return Err(value_error("scores: 4 numbers each are expected"));
+        if rows.ncols() != 5 {
+            return Err(value_error("scores: 5 numbers each are expected"));
         }
         let score = |row: numpy::ndarray::ArrayView1<'_, f64>| arena::Score {
             fitness: row[0],
             alive: row[1],
             behaviour: [row[2], row[3]],
+            promising: row[4] > 0.5,
             terms: arena::Terms::new(),
         };
         let scores: Vec<_> = rows.rows().into_iter().map(score).collect();

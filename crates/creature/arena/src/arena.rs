@@ -56,6 +56,8 @@ pub struct Score {
     /// What kind of motion it is, each number 0 to 1: the feet's time on the ground (without legs the
     /// torso's), and how quickly motors are told to reverse.
     pub behaviour: [f64; 2],
+    /// Whether nothing in the episode, short as it may be, speaks against its being usable.
+    pub promising: bool,
     /// The measured terms.
     pub terms: Terms,
 }
@@ -428,7 +430,8 @@ impl Arena {
     fn score_of(&self, body: &Body, tally: Option<&Tally>, wanted: &[Term]) -> Score {
         let Some(tally) = tally else {
             let (fitness, terms) = (f64::NAN, Terms::new());
-            return Score { fitness, alive: 0.0, behaviour: [0.0; 2], terms };
+            let behaviour = [0.0; 2];
+            return Score { fitness, alive: 0.0, behaviour, promising: false, terms };
         };
         let gravity = f64::from(self.settings.world.gravity);
         let value = |term: &Term| (*term, term.of(tally, body, gravity, self.task));
@@ -440,6 +443,7 @@ impl Arena {
             fitness: weighted.map(|(term, weight)| weight * terms[term]).sum(),
             alive: tally.alive(),
             behaviour: [down, (tally.reversals / told / QUICKEST).min(1.0)],
+            promising: self.task.promising(tally, body),
             terms,
         }
     }

@@ -19,6 +19,9 @@ const EACH_HELD: f64 = 1.0;
 const ROBUST: f64 = 10.0;
 const GOOD: f64 = 5.0;
 
+/// Replays of motions that cannot be usable are made once in so many generations.
+const SHOWN: u64 = 10;
+
 /// By how much of itself a fitness must grow so that a search counts as getting on.
 const LEAST_GAIN: f64 = 0.01;
 
@@ -243,11 +246,14 @@ impl Evolution {
             (self.best, self.best_at) = (Some(best), self.generation);
         }
         let many = arena.settings().search.trials.expect("resolved");
-        let first = order.iter().take(many).map(|&index| lesson.individual(&asked[index]));
+        // Now and then, whoever is best, so that there is something to show.
+        let shown = self.generation % SHOWN == 1;
+        let worth = order.iter().filter(|&&index| shown || scores[index].promising);
+        let first = worth.take(many).map(|&index| lesson.individual(&asked[index]));
         let hopefuls = first.collect::<Result<Vec<_>, _>>()?;
         let crowned = many == 0
             && self.crown_the_fittest(arena, order.first().map(|&index| &asked[index]), best)?;
-        if order.first().is_some_and(|&index| scores[index].alive >= 1.0)
+        if order.first().is_some_and(|&index| scores[index].alive >= 1.0 && scores[index].promising)
             && self.stage + 1 < lesson.stages().len()
         {
             self.stage += 1;

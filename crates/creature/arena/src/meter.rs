@@ -295,13 +295,19 @@ impl<S: Simd> Meter<S> {
         let joints = self.sums.len() as f64;
         let steps = self.lived.lane(lane) as usize;
         let series = |all: &Vec<Lanes<S>>| all.iter().take(steps).map(|a| a.lane(lane)).collect();
+        // Where an episode was over before, as if it had gone on and nothing had moved.
+        let lead = self.steps / 4;
+        let mark = |index: usize| {
+            let reached = self.step >= self.steps - lead + index as u32 * lead / 4;
+            of(if reached { self.marks[index] } else { self.end[0] })
+        };
         Tally {
             steps: f64::from(self.steps),
             lived,
             dt: of(self.dt),
             start: self.start.map(of),
             end: self.end.map(of),
-            marks: self.marks.map(of),
+            marks: [0, 1, 2, 3, 4].map(mark),
             rise: of(self.highest) - of(self.start[1]),
             apex_tilt: of(self.apex_tilt),
             airborne_rise: of(self.airborne) - of(self.start[1]),

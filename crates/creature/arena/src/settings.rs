@@ -26,7 +26,8 @@ pub struct TaskSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<u32>,
     /// Shorter episodes to begin with, in steps: each one is left when the best does not fall any
-    /// more. Default: none if `steps` is said, else as the task has it.
+    /// more and does nothing that makes it unusable. Default: none if `steps` is said, else as the
+    /// task has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grow: Option<Vec<u32>>,
     /// Whether an episode ends at a fall: the torso tilts by more than 1 rad, or touches the ground
@@ -68,9 +69,9 @@ pub enum Preset {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, expecting = "a table of settings")]
 pub struct SearchSettings {
-    /// The best so many of a generation are judged on replays, 0 to 1000; the champion is the one
-    /// that holds up best under other physics. 0: the one with the most fitness. Default: 16, in the
-    /// seed's protocol 0.
+    /// The best so many of a generation, of those whose episodes say nothing against it, are judged
+    /// on replays, 0 to 1000; the champion is the one that holds up best under other physics. 0: the
+    /// one with the most fitness. Default: 16, in the seed's protocol 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trials: Option<usize>,
     /// A search that does not get better by 1 % for so many generations begins anew, 0 to 1000000; 0:
@@ -253,6 +254,11 @@ impl Settings {
                 return Err(ArenaError::Settings(format!(
                     "controller.kind: graph is evolved by neat, not by {name}"
                 )));
+            }
+            // Angles want all of their range, −1 to 1, from the start; weights add up and saturate.
+            StrategySettings::Es(es) if natural && es.sigma == 0.0 => {
+                let network = controller.kind.is_some_and(Kind::has_network);
+                es.sigma = if network { 0.3 } else { 0.7 };
             }
             _ => {}
         }

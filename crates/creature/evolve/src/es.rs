@@ -25,7 +25,8 @@ pub struct EsSettings {
     pub population: usize,
     /// The best so many are parents, μ, up to half the population; 0: a quarter of it.
     pub parents: usize,
-    /// Standard deviation of a gene in the first generation, 0.000001 to 100.
+    /// Standard deviation of a gene in the first generation, up to 100; 0: what suits the genes, 0.5
+    /// if nothing is known of them.
     pub sigma: f64,
     /// The first generation's centre is uniform within ± this, 0 to 100.
     pub start: f32,
@@ -37,7 +38,7 @@ pub struct EsSettings {
 
 impl Default for EsSettings {
     fn default() -> Self {
-        Self { population: 64, parents: 0, sigma: 0.5, start: 0.0, per_gene: false, learning: 1.0 }
+        Self { population: 64, parents: 0, sigma: 0.0, start: 0.0, per_gene: false, learning: 1.0 }
     }
 }
 
@@ -54,7 +55,7 @@ impl EsSettings {
                 (self.population / 2) as f64,
                 "0 to half the population",
             ),
-            ("sigma", self.sigma, *STEPS.start(), 100.0, "0.000001 to 100"),
+            ("sigma", self.sigma, 0.0, *STEPS.end(), "0 to 100"),
             ("start", f64::from(self.start), 0.0, 100.0, "0 to 100"),
             ("learning", self.learning, 0.0, 10.0, "0 to 10"),
         ])
@@ -90,7 +91,8 @@ impl Es {
         some_genes(genes)?;
         let mut random = Random::new(seed);
         let centre = scattered(genes, settings.start, &mut random);
-        let step = vec![settings.sigma; if settings.per_gene { genes } else { 1 }];
+        let first = if settings.sigma == 0.0 { 0.5 } else { settings.sigma.max(*STEPS.start()) };
+        let step = vec![first; if settings.per_gene { genes } else { 1 }];
         let (genomes, steps) = (vec![], vec![]);
         let mut search = Self { settings, generation: 0, random, centre, step, genomes, steps };
         search.draw();

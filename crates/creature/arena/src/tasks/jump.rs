@@ -65,6 +65,10 @@ impl Task for Jump {
         Some(0.5 * f64::from(size))
     }
 
+    fn promising(&self, tally: &Tally, body: &Body) -> bool {
+        self.reasons(tally, body).is_empty()
+    }
+
     /// High enough, off the ground, upright at the top, standing at the end.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String> {
         let legless = body.legs().is_empty();

@@ -61,6 +61,10 @@ impl Task for KeepUpright {
         true
     }
 
+    fn promising(&self, tally: &Tally, body: &Body) -> bool {
+        self.reasons(tally, body).is_empty()
+    }
+
     /// Upright nearly always, its torso off the ground, about where it began.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String> {
         let mut reasons = posture(tally, body);

@@ -76,6 +76,11 @@ pub trait Task: Sync {
     fn rise_needed(&self, _: &Body) -> Option<f64> {
         None
     }
+    /// Whether an episode, short as it may be, says nothing against the motion: those are worth a
+    /// replay, and a longer episode.
+    fn promising(&self, tally: &Tally, body: &Body) -> bool {
+        Run.reasons(tally, body).is_empty()
+    }
     /// Why a motion is not usable; nothing if it is.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String>;
 }

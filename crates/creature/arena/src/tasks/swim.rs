@@ -49,6 +49,10 @@ impl Task for Swim {
         Physics { water: Some(asked.water.unwrap_or_default()), ..asked }
     }
 
+    fn promising(&self, tally: &Tally, body: &Body) -> bool {
+        self.reasons(tally, body).is_empty()
+    }
+
     /// Steady speed, no somersaults, every joint moves.
     fn reasons(&self, tally: &Tally, body: &Body) -> Vec<String> {
         let mut reasons = Vec::new();
