@@ -247,7 +247,8 @@ impl Evolution {
         }
         let many = arena.settings().search.trials.expect("resolved");
         // Now and then, whoever is best, so that there is something to show.
-        let shown = self.generation % SHOWN == 1;
+        let nothing = ahead == 0 && self.champion.is_none();
+        let shown = nothing || self.generation % SHOWN == 1;
         let worth = order.iter().filter(|&&index| shown || scores[index].promising);
         let first = worth.take(many).map(|&index| lesson.individual(&asked[index]));
         let hopefuls = first.collect::<Result<Vec<_>, _>>()?;
