@@ -181,11 +181,16 @@ def page(results: dict[str, Any]) -> str:
         "distance or height kept there, median |",
         "|---|---|---|---|---|---|---|",
     ]
+    rows = {row.name: row for row in ROWS}
     for total in results["totals"]:
+        row = rows[total["row"]]
         cells = [_of(total, level) for level in LEVELS]
+        if row.until != "good":  # Nobody waited for it.
+            cells[LEVELS.index("good")] = "–"
+        regular = "–" if row.task in ("jump", "keep_upright") else str(total["regular"])
         kept = total["kept_in_box2d"]
         lines.append(
-            f"| {total['row']} | {' | '.join(cells)} | {total['regular']} | "
+            f"| {total['row']} | {' | '.join(cells)} | {regular} | "
             f"{total['usable_in_box2d']} | {'–' if kept is None else f'{kept:.2f}'} |"
         )
     for row in ROWS:
