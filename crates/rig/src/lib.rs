@@ -10,6 +10,8 @@
 
 mod axes;
 mod clip;
+mod halflife;
+mod limb;
 mod mirror;
 mod pose;
 mod prune;
@@ -19,6 +21,8 @@ mod terrain;
 
 pub use axes::{Axes, AxesError, Axis, Conversion, Handedness};
 pub use clip::{Clip, ClipError};
+pub use halflife::share;
+pub use limb::{bend_axis, two_bone, two_bone_to};
 pub use mirror::{Mirror, MirrorError};
 pub use pose::{Pose, Transform};
 pub use roles::Roles;

@@ -78,14 +78,37 @@ impl Pose {
     /// # Panics
     /// When the pose, the skeleton and `global` differ in length.
     pub fn to_global(&self, skeleton: &Skeleton, global: &mut [Transform]) {
+        self.update_global(skeleton, 0, global);
+    }
+
+    /// [`Pose::to_global`] of the joints from `first` on: all that is needed after changing joints
+    /// of which `first` is the foremost.
+    ///
+    /// # Panics
+    /// When the pose, the skeleton and `global` differ in length.
+    pub fn update_global(&self, skeleton: &Skeleton, first: usize, global: &mut [Transform]) {
         assert_eq!(self.local.len(), skeleton.len(), "pose and skeleton differ in joints");
         assert_eq!(global.len(), skeleton.len(), "buffer and skeleton differ in joints");
-        for (index, joint) in skeleton.joints().iter().enumerate() {
+        for (index, joint) in skeleton.joints().iter().enumerate().skip(first) {
             global[index] = match joint.parent {
                 Some(parent) => global[parent] * self.local[index],
                 None => self.local[index],
             };
         }
+    }
+
+    /// Turns a joint so that its rotation in the world is `rotation`; its own transform in `global`
+    /// follows, those of the joints it carries do not ([`Pose::update_global`] sees to them).
+    pub fn turn_to(
+        &mut self,
+        skeleton: &Skeleton,
+        joint: usize,
+        rotation: Quat,
+        global: &mut [Transform],
+    ) {
+        let parent = skeleton.joints()[joint].parent.map_or(Transform::IDENTITY, |p| global[p]);
+        self.local[joint].rotation = (parent.rotation.inverse() * rotation).normalize();
+        global[joint] = parent * self.local[joint];
     }
 
     /// The inverse of [`Pose::to_global`].
@@ -148,6 +171,24 @@ mod tests {
             assert!(a.translation.abs_diff_eq(b.translation, 1e-6));
             assert!(a.rotation.abs_diff_eq(b.rotation, 1e-6));
         }
+    }
+
+    #[test]
+    fn a_joint_turns_to_a_rotation_of_the_world() {
+        let skeleton = arm();
+        let mut pose = skeleton.rest_pose();
+        pose.local[0].rotation = Quat::from_rotation_z(0.4);
+        let mut global = vec![Transform::IDENTITY; 3];
+        pose.to_global(&skeleton, &mut global);
+        let wanted = Quat::from_rotation_y(1.1);
+        pose.turn_to(&skeleton, 1, wanted, &mut global);
+        pose.update_global(&skeleton, 2, &mut global);
+        let mut again = vec![Transform::IDENTITY; 3];
+        pose.to_global(&skeleton, &mut again);
+        assert_eq!(again, global);
+        assert!(global[1].rotation.abs_diff_eq(wanted, 1e-6));
+        let wrist = global[1].translation + wanted * Vec3::X;
+        assert!(global[2].translation.abs_diff_eq(wrist, 1e-6));
     }
 
     #[test]

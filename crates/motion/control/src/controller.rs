@@ -10,8 +10,8 @@ use ambulo_rig::{Pose, Transform};
 use crate::feet::Hold;
 use crate::legs::Leg;
 use crate::trajectory::{Trajectory, yaw};
-use crate::tuning::share;
 use crate::{ControlError, Intent, Model, TrajectoryPoint, Tuning, World};
+use ambulo_rig::share;
 
 /// Longest time that one call catches up on, seconds.
 const LONGEST: f32 = 1.0;

@@ -6,7 +6,7 @@
 
 use ambulo_rig::glam::Vec2;
 
-use crate::tuning::share;
+use ambulo_rig::share;
 
 /// A foot is held from this contact on …
 const HOLD: f32 = 0.6;

@@ -1,7 +1,7 @@
 //! Ankles where the network puts them, on bones of the skeleton's own length.
 
-use ambulo_rig::glam::{Quat, Vec3};
-use ambulo_rig::{Pose, Skeleton, Transform};
+use ambulo_rig::glam::Vec3;
+use ambulo_rig::{Pose, Skeleton, Transform, bend_axis, two_bone};
 
 /// One leg by joint index, from the hip down.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,11 +15,6 @@ pub struct Leg {
     sure: bool,
 }
 
-/// Sine of the angle between the upper bone and the leg's whole line, below which a bend tells
-/// little of where the knee goes: legs are often straight within a network's error, and a knee that
-/// is a degree on the wrong side must not be bent on that side when the foot comes nearer.
-const STRAIGHT: f32 = 0.1;
-
 impl Leg {
     /// The two bones above a foot; `None` where it has no two. `bent` has the transforms, in the
     /// root's frame, of a pose in which the leg is bent the way it can: knees forward, hocks back.
@@ -29,13 +24,10 @@ impl Leg {
         let upper = skeleton.joints()[lower].parent?;
         // The root is not a leg's bone: turning it would turn everything.
         skeleton.joints()[upper].parent?;
-        let [a, b, c] = [upper, lower, foot].map(|joint| bent[joint].translation.as_dvec3());
-        let across = (c - a).cross(b - a);
-        // Bends of less than a degree tell nothing; people's knees bend about their right.
-        let clear = across.length() > 0.01 * (c - a).length() * (b - a).length();
-        let axis = if clear { across.normalize().as_vec3() } else { Vec3::NEG_X };
-        let hinge = bent[lower].rotation.inverse() * axis;
-        Some(Self { upper, lower, foot, hinge, sure: clear })
+        let axis = bend_axis([upper, lower, foot].map(|joint| bent[joint].translation));
+        // People's knees bend about their right.
+        let hinge = bent[lower].rotation.inverse() * axis.unwrap_or(Vec3::NEG_X);
+        Some(Self { upper, lower, foot, hinge, sure: axis.is_some() })
     }
 
     /// Bends the leg so that its foot comes to `ankle`, or as near as it can; the foot keeps its
@@ -63,59 +55,11 @@ impl Leg {
     }
 }
 
-/// Turns, in the world, of the upper and the lower bone of a chain a–b–c that bring c to `target`
-/// in the plane in which it bends already; `hinge` is the axis to bend about when it is straight,
-/// and, if that is `sure`, the more so the nearer to straight it is, or bent the wrong way.
-fn two_bone([a, b, c]: [Vec3; 3], target: Vec3, hinge: Vec3, sure: bool) -> [Quat; 2] {
-    let (upper, lower) = (a.distance(b), b.distance(c));
-    // Written so that NaN is refused too: clamping needs ordered bounds.
-    let long = |length: f32| length > 1e-4 && length.is_finite();
-    if ![upper, lower, a.distance(target), a.distance(c)].into_iter().all(long) {
-        return [Quat::IDENTITY; 2];
-    }
-    let nearest = (upper - lower).abs() + 1e-4;
-    let farthest = (upper + lower) * 0.9995;
-    let reach = a.distance(target).clamp(nearest.min(farthest), farthest);
-    // Law of cosines: the angles at a and at b, as they are and as they must be.
-    let opposite = |side: f32, p: f32, q: f32| {
-        ((p * p + q * q - side * side) / (2.0 * p * q)).clamp(-1.0, 1.0).acos()
-    };
-    let now = a.distance(c);
-    let at_a = opposite(lower, reach, upper) - opposite(lower, now, upper);
-    let at_b = opposite(reach, upper, lower) - opposite(now, upper, lower);
-    let across = (c - a).cross(b - a);
-    let straight = across.length() < 1e-3 * upper * now;
-    let bend = across.dot(hinge) / (upper * now);
-    if sure && !straight && bend < STRAIGHT {
-        let drawn = (bend / STRAIGHT).max(0.0);
-        let axis = (across / (upper * now) / STRAIGHT).lerp(hinge, 1.0 - drawn);
-        return toward([a, b, c], target, reach, axis);
-    }
-    let axis = if straight { hinge.normalize_or(Vec3::X) } else { across.normalize() };
-    let swing = Quat::from_rotation_arc((c - a).normalize(), (target - a).normalize());
-    let upper = swing * Quat::from_axis_angle(axis, at_a);
-    [upper, upper * Quat::from_axis_angle(axis, at_b)]
-}
-
-/// The turns that bring c to `reach` from a, towards `target`, with b on the side that bending
-/// about `axis` puts it; the bones twist as little as they can.
-fn toward([a, b, c]: [Vec3; 3], target: Vec3, reach: f32, axis: Vec3) -> [Quat; 2] {
-    let (upper, lower) = (a.distance(b), b.distance(c));
-    let line = (target - a).normalize();
-    let pole = axis.cross(line).normalize_or(line.any_orthonormal_vector());
-    let along = (upper * upper + reach * reach - lower * lower) / (2.0 * reach);
-    let knee = line * along + pole * (upper * upper - along * along).max(0.0).sqrt();
-    let first = Quat::from_rotation_arc((b - a) / upper, knee.normalize_or(line));
-    let shin = (line * reach - knee).normalize_or(line);
-    let second = Quat::from_rotation_arc(first * ((c - b) / lower), shin);
-    [first, second * first]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use ambulo_rig::Joint;
-    use ambulo_rig::glam::DVec3;
+    use ambulo_rig::glam::{DVec3, Quat};
     use proptest::prelude::*;
 
     fn leg() -> (Skeleton, Leg) {
@@ -211,16 +155,6 @@ mod tests {
                 assert!(a.angle_between(b) < 0.05, "{flex}: {}", a.angle_between(b));
             }
             before = now;
-        }
-    }
-
-    #[test]
-    fn numbers_that_are_none_leave_the_leg_alone() {
-        for bad in [f32::NAN, f32::INFINITY, 1e38] {
-            let far = Vec3::splat(bad);
-            for chain in [[far; 3], [Vec3::Y, Vec3::ZERO, far]] {
-                assert_eq!(two_bone(chain, far, Vec3::X, true), [Quat::IDENTITY; 2]);
-            }
         }
     }
 

@@ -5,8 +5,8 @@ use ambulo_features::{FUTURE, GAITS, Ground, Output, Point, SAMPLES, WINDOW};
 use ambulo_rig::glam::{Quat, Vec2, Vec3};
 
 use crate::idle::{Idle, Wish};
-use crate::tuning::share;
 use crate::{Areas, Gait, Intent, Tuning, World};
+use ambulo_rig::share;
 
 /// Points of the window: one a frame, a second each way.
 pub const WINDOW_POINTS: usize = 2 * WINDOW;

@@ -114,14 +114,10 @@ const MOST: f32 = 10.0;
 /// Nobody stands and wanders farther, metres.
 const MOST_SWAY: f32 = 0.2;
 
-/// Share of the way to a target that `dt` covers at a half-life; 1 at half-life 0.
-pub fn share(halflife: f32, dt: f32) -> f32 {
-    if halflife > 0.0 { 1.0 - (-std::f32::consts::LN_2 * dt / halflife).exp() } else { 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ambulo_rig::share;
 
     #[test]
     fn defaults_are_the_published_blends() {
