@@ -144,7 +144,7 @@ def test_says_what_is_missing(captures: Path, tmp_path: Path) -> None:
     assert "name motion files or folders" in build("-o", tmp_path / "data", code=2)
     empty = tmp_path / "empty"
     empty.mkdir()
-    assert "no .bvh or .amc file" in build(empty, "-o", tmp_path / "data", code=2)
+    assert "no .bvh, .amc or .keys file" in build(empty, "-o", tmp_path / "data", code=2)
     assert "has no dataset.json" in ambulo("dataset", "info", empty, code=1)
     (empty / "broken.bvh").write_text("HIERARCHY\nROOT a\n{\n")
     output = build(empty, "-o", tmp_path / "data", code=1)

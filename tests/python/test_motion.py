@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 from ambulo import _core
 from ambulo._core import Clip, MotionFileError, motion_axes, read_motion, write_motion
 from ambulo.cli.motion import motion
+from ambulo.starters import FOLDER
 
 # Left is +X, in centimetres; the left arm is raised, the right one hangs stretched to the side.
 PERSON = """HIERARCHY
@@ -521,6 +522,39 @@ class TestInfo:
             for args in (("info", path), ("convert", path, tmp_path / "out.bvh")):
                 result = run(*args)
                 assert result.exit_code == 2 and f"{path}: not a regular file" in result.stderr
+
+
+class TestKeys:
+    CLIPS = FOLDER / "clips"
+
+    def test_a_clip_by_hand_is_read_and_told(self, run: Run) -> None:
+        clip, report = read_motion(self.CLIPS / "sit.keys")
+        assert clip.fps == pytest.approx(60.0) and report["metres_per_unit"] == 1.0
+        assert report["phases"][1] == ("hold", 1.9, 4.3, True)
+        assert ("seat", 1.2) in report["events"]
+        assert report["axes"] == "ambulo"
+        told = run("info", self.CLIPS / "sit.keys").stdout
+        assert "phase hold: 1.9 to 4.3 s, loops" in told and "event seat: 1.2 s" in told
+
+    def test_a_folder_becomes_bvh(self, run: Run, tmp_path: Path) -> None:
+        result = run("convert", self.CLIPS, tmp_path / "out", "--axes", "ambulo", "--json")
+        assert result.exit_code == 0
+        assert not any("taken for" in str(entry["notes"]) for entry in json.loads(result.stdout))
+        assert {entry["joints"] for entry in json.loads(result.stdout)} == {22}
+        right, _ = read_motion(tmp_path / "out" / "open_door_right.bvh")
+        left, _ = read_motion(tmp_path / "out" / "open_door_left.bvh")
+        hand = right.names.index("RightHand"), left.names.index("LeftHand")
+        at, other = right.positions()[45, hand[0]], left.positions()[45, hand[1]]
+        assert np.allclose(at * [-1, 1, 1], other, atol=1e-4)
+
+    def test_a_mistake_is_named(self, run: Run, tmp_path: Path) -> None:
+        (tmp_path / "a.keys").write_text("keys 1\nskeleton b.skeleton\nkey 0\n")
+        result = run("info", tmp_path / "a.keys")
+        assert result.exit_code == 1
+        assert "a.keys: line 2, column 10: expected a file beside" in result.stderr
+        (tmp_path / "b.skeleton").write_text("keys 1\nbone a - 0 0\n")
+        result = run("info", tmp_path / "a.keys")
+        assert "b.skeleton: line 2, column 13: expected metres from the parent" in result.stderr
 
 
 def test_the_hosts_are_all_known() -> None:

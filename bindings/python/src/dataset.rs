@@ -27,7 +27,7 @@ fn load(path: &Path) -> Result<Loaded, String> {
     let options = ReadOptions::default();
     let file = read_path(path, &options).map_err(|error| error.to_string())?;
     let found = detect(&file.clip, Positions::Replace);
-    let axes = found.preset().map(str::to_owned).ok_or_else(|| {
+    let axes = file.axes().or_else(|| found.preset()).map(str::to_owned).ok_or_else(|| {
         let why = if found.notes.is_empty() { "" } else { ": " };
         format!("its axes and unit cannot be told{why}{}", found.notes.join("; "))
     });

@@ -296,6 +296,13 @@ pub fn read_motion<'py>(
     report.set_item("seconds", file.clip.frames() as f64 * file.clip.frame_time())?;
     report.set_item("joints", file.clip.skeleton().len())?;
     report.set_item("metres_per_unit", file.metres_per_unit)?;
+    report.set_item("axes", file.axes())?;
+    if let Some(marks) = &file.marks {
+        let phases = marks.phases.iter().map(|p| (p.name.as_str(), p.start, p.end, p.loops));
+        report.set_item("phases", phases.collect::<Vec<_>>())?;
+        let events = marks.events.iter().map(|event| (event.name.as_str(), event.time));
+        report.set_item("events", events.collect::<Vec<_>>())?;
+    }
     report.set_item("notes", texts(&file.notes))?;
     report.set_item("detected", described(py, &detected)?)?;
     Ok((Clip { clip: file.clip, dialect: file.dialect }, report))

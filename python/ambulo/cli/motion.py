@@ -14,7 +14,7 @@ from ambulo import _core
 from ambulo.cli.progress import bar
 from ambulo.cli.stopping import STOPPED, held_back
 
-SUFFIXES = {".bvh", ".amc"}
+SUFFIXES = {".bvh", ".amc", ".keys"}
 EXISTS = "exists; --overwrite replaces it"
 # A conversion run twice by mistake fails for every file; more lines than these tell no more.
 ALIKE = 5
@@ -23,7 +23,7 @@ AXES = click.Choice(_core.motion_axes(), case_sensitive=False)
 
 @click.group()
 def motion() -> None:
-    """Look at and convert motion files (BVH, and AMC with its ASF)."""
+    """Look at and convert motion files (BVH, AMC with its ASF, and keys)."""
 
 
 @dataclass
@@ -164,7 +164,7 @@ def motion_files(path: Path) -> Iterator[Path]:
     _refuse_special(path)
     files = [p for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file()]
     if not files:
-        raise click.UsageError(f"no .bvh or .amc file below {path}")
+        raise click.UsageError(f"no .bvh, .amc or .keys file below {path}")
     yield from sorted(files)
 
 
@@ -222,7 +222,9 @@ def _identity(path: Path) -> tuple[int, int]:
 
 
 def _guessed(report: dict[str, Any], outcome: Outcome) -> str:
-    """What a file seems to be in; a note says so, since nobody did."""
+    """What a file's format says it is in, or what it seems to be in; a note says the latter."""
+    if report["axes"]:
+        return str(report["axes"])
     guess = report["detected"]["axes"]
     if not guess:
         raise ValueError(f"{outcome.input}: its axes and unit cannot be told; name --from-axes")
@@ -286,6 +288,11 @@ def _described(outcome: Outcome, path: Path) -> str:
         guesses.append(f"position channels: {seen['positions']}")
     if guesses:
         lines.append(f"  seems: {', '.join(guesses)}")
+    lines += [
+        f"  phase {name}: {start:g} to {end:g} s{', loops' if loops else ''}"
+        for name, start, end, loops in report.get("phases", [])
+    ]
+    lines += [f"  event {name}: {time:g} s" for name, time in report.get("events", [])]
     lines += [f"  note: {note}" for note in [*report["notes"], *seen["notes"]]]
     return "\n".join(lines)
 

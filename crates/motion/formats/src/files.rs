@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use ambulo_rig::Clip;
 
 use crate::bvh::{self, Dialect, WriteOptions};
+use crate::keys::{self, Keys, Marks};
 use crate::{Note, ReadError, ReadOptions, amc};
 
 /// A format by its suffix.
@@ -18,16 +19,17 @@ pub enum Format {
     Bvh,
     /// `.amc`, with an `.asf` beside it.
     Amc,
+    /// `.keys`, with what it names beside it.
+    Keys,
 }
 
 impl Format {
     /// The format of files of that name, by suffix in any case.
     pub fn of(path: &Path) -> Option<Self> {
         let suffix = path.extension()?;
-        [(Self::Bvh, "bvh"), (Self::Amc, "amc")]
+        [Self::Bvh, Self::Amc, Self::Keys]
             .into_iter()
-            .find(|(_, known)| suffix.eq_ignore_ascii_case(known))
-            .map(|(format, _)| format)
+            .find(|format| suffix.eq_ignore_ascii_case(format.suffix()))
     }
 
     /// In lower case, without a dot.
@@ -35,6 +37,7 @@ impl Format {
         match self {
             Self::Bvh => "bvh",
             Self::Amc => "amc",
+            Self::Keys => "keys",
         }
     }
 }
@@ -50,8 +53,18 @@ pub struct MotionFile {
     pub dialect: Option<Dialect>,
     /// The length of a unit, where the format says it.
     pub metres_per_unit: Option<f64>,
+    /// Phases and events, where the format has them.
+    pub marks: Option<Marks>,
     /// What was odd or mended.
     pub notes: Vec<Note>,
+}
+
+impl MotionFile {
+    /// The preset of [`ambulo_rig::Axes`] that the format prescribes; files of the others are in
+    /// whatever their makers liked.
+    pub fn axes(&self) -> Option<&'static str> {
+        (self.format == Format::Keys).then_some("ambulo")
+    }
 }
 
 /// Why a path could not be read or written.
@@ -81,7 +94,7 @@ fn io_error(path: &Path) -> impl FnOnce(io::Error) -> FileError + '_ {
 /// # Errors
 /// A suffix that is not known, a file that cannot be opened, is not whole, or has no skeleton.
 pub fn read_path(path: &Path, options: &ReadOptions) -> Result<MotionFile, FileError> {
-    let unknown = || FileError::Suffix { path: path.into(), known: ".bvh, .amc" };
+    let unknown = || FileError::Suffix { path: path.into(), known: ".bvh, .amc, .keys" };
     let format = Format::of(path).ok_or_else(unknown)?;
     let load = |path: &Path| fs::read(path).map_err(io_error(path));
     let bytes = load(path)?;
@@ -90,7 +103,7 @@ pub fn read_path(path: &Path, options: &ReadOptions) -> Result<MotionFile, FileE
         Format::Bvh => {
             let bvh = bvh::read(&bytes, options).map_err(|error| named(path, error))?;
             let (clip, dialect, notes) = (bvh.clip, Some(bvh.dialect), bvh.notes);
-            Ok(MotionFile { clip, format, dialect, metres_per_unit: None, notes })
+            Ok(MotionFile { clip, format, dialect, metres_per_unit: None, marks: None, notes })
         }
         Format::Amc => {
             let beside = skeleton_of(path)?;
@@ -98,9 +111,35 @@ pub fn read_path(path: &Path, options: &ReadOptions) -> Result<MotionFile, FileE
                 amc::Asf::read(&load(&beside)?).map_err(|error| named(&beside, error))?;
             let amc = amc::read(&skeleton, &bytes, options).map_err(|error| named(path, error))?;
             let (clip, metres_per_unit, notes) = (amc.clip, amc.metres_per_unit, amc.notes);
-            Ok(MotionFile { clip, format, dialect: None, metres_per_unit, notes })
+            Ok(MotionFile { clip, format, dialect: None, metres_per_unit, marks: None, notes })
+        }
+        Format::Keys => {
+            let keys = parse_keys(path, &bytes)?;
+            let (keys::Sampled { clip, notes }, marks) =
+                (keys.sample(), Some(keys.marks().clone()));
+            Ok(MotionFile { clip, format, dialect: None, metres_per_unit: Some(1.0), marks, notes })
         }
     }
+}
+
+/// Reads a `.keys` file's keys, with the files beside it that it names.
+///
+/// # Errors
+/// A file that cannot be opened or is not whole.
+pub fn read_keys(path: &Path) -> Result<Keys, FileError> {
+    parse_keys(path, &fs::read(path).map_err(io_error(path))?)
+}
+
+fn parse_keys(path: &Path, bytes: &[u8]) -> Result<Keys, FileError> {
+    let mut beside = |name: &str| {
+        let path = path.with_file_name(name);
+        fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))
+    };
+    let keys = keys::read(bytes, &mut beside).map_err(|error| {
+        let path = error.file.as_ref().map_or(path.to_owned(), |name| path.with_file_name(name));
+        error.with_file(path.display().to_string())
+    })?;
+    Ok(keys)
 }
 
 /// The ASF file beside an AMC file: of the same name (`02_01.asf`), of the subject (`02.asf` for

@@ -13,6 +13,7 @@ pub mod detect;
 mod error;
 mod euler;
 pub mod files;
+pub mod keys;
 mod text;
 
 pub use error::{Note, ReadError};

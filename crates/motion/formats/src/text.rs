@@ -143,7 +143,7 @@ impl<'a> Cursor<'a> {
 }
 
 /// A word as it is shown in an error: in quotes, and cut when it is long.
-fn quoted(word: &[u8]) -> String {
+pub(crate) fn quoted(word: &[u8]) -> String {
     const MOST: usize = 40;
     if word.is_empty() {
         return "the end of the file".into();

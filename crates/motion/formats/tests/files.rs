@@ -56,7 +56,9 @@ fn the_suffix_chooses_the_reader() {
     assert_eq!((amc.format, amc.metres_per_unit), (Format::Amc, Some(0.0254)));
     let error = read_path(&folder.file("c.fbx", ""), &options).unwrap_err();
     assert!(matches!(error, FileError::Suffix { .. }));
-    assert!(error.to_string().ends_with("not a motion file by its suffix; known: .bvh, .amc"));
+    assert!(
+        error.to_string().ends_with("not a motion file by its suffix; known: .bvh, .amc, .keys")
+    );
 }
 
 #[test]
