@@ -1,3 +1,5 @@
+use std::f32::consts::LN_2;
+
 use super::*;
 use proptest::prelude::*;
 use std::f32::consts::PI;
