@@ -9,6 +9,7 @@
 //! Metres, kilograms, seconds, radians, newtons; right-handed, +Y up. An object's front is its +Z, its
 //! left +X; a yaw turns +Z towards +X. Unit quaternions as (x, y, z, w).
 
+mod approach;
 mod curve;
 mod exact;
 mod ground;
@@ -21,6 +22,7 @@ mod reading;
 mod scene_check;
 mod scene_file;
 
+pub use approach::{Going, Walk, Why};
 pub use curve::weight;
 pub use ground::GroundPieces;
 pub use interaction::{
