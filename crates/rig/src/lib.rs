@@ -8,6 +8,7 @@
 //! `f64`, so that reading and writing again changes nothing; what runs every frame ([`Pose`],
 //! [`Terrain`]) is `f32`.
 
+mod angle;
 mod axes;
 mod clip;
 mod halflife;
@@ -19,6 +20,7 @@ mod roles;
 mod skeleton;
 mod terrain;
 
+pub use angle::wrapped;
 pub use axes::{Axes, AxesError, Axis, Conversion, Handedness};
 pub use clip::{Clip, ClipError};
 pub use halflife::share;

@@ -1,17 +1,16 @@
 //! One character: fixed steps inside, interpolated poses outside.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::TAU;
 
 use ambulo_features::{Input, Output};
 use ambulo_net::Scratch;
 use ambulo_rig::glam::{Quat, Vec2, Vec3};
-use ambulo_rig::{Pose, Transform};
+use ambulo_rig::{Pose, Transform, share, wrapped};
 
 use crate::feet::Hold;
 use crate::legs::Leg;
 use crate::trajectory::{Trajectory, yaw};
 use crate::{ControlError, Intent, Model, TrajectoryPoint, Tuning, World};
-use ambulo_rig::share;
 
 /// Longest time that one call catches up on, seconds.
 const LONGEST: f32 = 1.0;
@@ -423,11 +422,6 @@ impl Controller {
 fn no_snap(before: Quat, now: Quat, most: f32) -> Quat {
     let angle = before.angle_between(now);
     if angle > most { before.slerp(now, most / angle) } else { now }
-}
-
-/// The same angle in [−π, π).
-fn wrapped(angle: f32) -> f32 {
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

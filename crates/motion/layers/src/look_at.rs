@@ -6,7 +6,7 @@
 //! turn fades, and straight above and below it the yaw, since the other way round would be as good.
 
 use ambulo_rig::glam::{Quat, Vec2, Vec3};
-use ambulo_rig::{Pose, Skeleton, Transform};
+use ambulo_rig::{Pose, Skeleton, Transform, wrapped};
 use serde::{Deserialize, Serialize};
 
 use crate::smooth::{smoothstep, spring};
@@ -265,12 +265,6 @@ fn angles(direction: Vec3) -> Vec2 {
 /// Turns +Z to a yaw and a pitch, with the horizon level.
 fn facing(angles: Vec2) -> Quat {
     Quat::from_rotation_y(angles.x) * Quat::from_rotation_x(-angles.y)
-}
-
-/// The same angle in [−π, π).
-fn wrapped(angle: f32) -> f32 {
-    use std::f32::consts::{PI, TAU};
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! goes over the ground, with its phases and events.
 
 use ambulo_rig::glam::{Quat, Vec3};
-use ambulo_rig::{Clip, Pose, Transform};
+use ambulo_rig::{Clip, Pose, Transform, wrapped};
 use serde::{Deserialize, Serialize};
 
 /// Most transforms of a motion: 280 MB of them, more than an hour of a person at 60 Hz.
@@ -264,12 +264,6 @@ fn part_root(transforms: &mut [Transform], joints: usize) -> (Vec3, Vec<GroundSt
         way.push(step);
     }
     (start, way)
-}
-
-/// The same angle in [−π, π).
-fn wrapped(angle: f32) -> f32 {
-    use std::f32::consts::{PI, TAU};
-    (angle + PI).rem_euclid(TAU) - PI
 }
 
 #[cfg(test)]

@@ -4,10 +4,9 @@
 //! gives up when somebody else wants something else or when the way is blocked. Nothing is moved but
 //! by the character's own steps; what is missing when it has arrived, [`Approach`] allows.
 
-use std::f32::consts::{PI, TAU};
-
 use ambulo_control::{Gait as Pace, Intent, Root};
 use ambulo_rig::glam::Vec2;
+use ambulo_rig::wrapped;
 
 use crate::{Approach, Gait};
 
@@ -93,7 +92,7 @@ impl Walk {
     /// that velocity (x, z).
     pub fn step(&mut self, root: Root, wish: Vec2, dt: f32) -> Going {
         let to = self.place - Vec2::new(root.position.x, root.position.z);
-        let left = [to.length(), turned(self.yaw - root.yaw).abs()];
+        let left = [to.length(), wrapped(self.yaw - root.yaw).abs()];
         if !(left[0].is_finite() && left[1].is_finite()) {
             return Going::GaveUp(Why::Lost);
         }
@@ -126,9 +125,4 @@ impl Walk {
             gait: self.pace,
         })
     }
-}
-
-/// The same angle in [−π, π).
-fn turned(angle: f32) -> f32 {
-    (angle + PI).rem_euclid(TAU) - PI
 }

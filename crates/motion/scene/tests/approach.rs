@@ -5,8 +5,8 @@ use std::sync::{Arc, OnceLock};
 
 use ambulo_control::{Areas, Controller, Intent, Model, Root, Wall, World};
 use ambulo_net::Bundle;
-use ambulo_rig::Flat;
 use ambulo_rig::glam::Vec2;
+use ambulo_rig::{Flat, wrapped};
 use ambulo_scene::{Approach, Gait, Going, Walk, Why};
 
 const DT: f32 = 1.0 / 60.0;
@@ -70,7 +70,7 @@ fn it_gets_there_from_everywhere_and_faces_what_it_should() {
             let which = (direction, facing);
             assert_eq!(end, Going::There, "{which:?} after {time} s");
             let off = place.distance(Vec2::new(root.position.x, root.position.z));
-            let turn = (facing - root.yaw + PI).rem_euclid(TAU) - PI;
+            let turn = wrapped(facing - root.yaw);
             assert!(
                 off <= 0.1 && turn.abs() <= 0.2 && time < 12.0,
                 "{which:?}: {off} {turn} {time}"
