@@ -14,10 +14,14 @@ mod clip;
 mod halflife;
 mod limb;
 mod mirror;
+mod palm;
 mod pose;
 mod prune;
+mod retarget;
+mod retarget_map;
 mod roles;
 mod skeleton;
+mod stance;
 mod terrain;
 
 pub use angle::wrapped;
@@ -26,9 +30,12 @@ pub use clip::{Clip, ClipError};
 pub use halflife::share;
 pub use limb::{bend_axis, two_bone, two_bone_to};
 pub use mirror::{Mirror, MirrorError};
+pub use palm::palm;
 pub use pose::{Pose, Transform};
+pub use retarget::{Retarget, RetargetError};
 pub use roles::Roles;
 pub use skeleton::{Joint, Skeleton, SkeletonError};
+pub use stance::Stance;
 pub use terrain::{Flat, HeightField, HeightFieldError, Terrain};
 
 pub use glam;
