@@ -204,35 +204,74 @@ def _trace_squashed(rays: list, a: Array, b: Array, cones: Cones, i: int, axis: 
     return t, [n * scale for n in normal]
 
 
-def draw_cones(picture: Pixels, camera: Camera, cones: Cones, sun: Array) -> None:
-    """Draws `cones` over `picture` (H, W, 3), in place; `sun` (3,) is the way its light travels."""
+@dataclass(frozen=True)
+class Surface:
+    """What a window of the picture sees of a heap of cones, on its samples."""
+
+    rows: slice
+    """Of the picture, in pixels."""
+    columns: slice
+    t: Array
+    """(h, w) samples: metres along the ray, inf where it misses."""
+    normal: Pixels
+    """(3, h, w) unit, camera axes."""
+    colour: Pixels
+    """(3, h, w)"""
+    rays: list[Pixels]
+    """Three planes (h, w): unit rays, camera axes."""
+
+
+def see_cones(camera: Camera, cones: Cones) -> Surface | None:
+    """The nearest surface of `cones`; None if none is in view."""
     hits, seen = _trace(camera, cones)
     if not hits:
-        return
+        return None
     n = SUPERSAMPLE
     top = min(h.box[0].start for h in hits) // n
     bottom = -(-max(h.box[0].stop for h in hits) // n)
     left = min(h.box[1].start for h in hits) // n
     right = -(-max(h.box[1].stop for h in hits) // n)
-    shape = ((bottom - top) * n, (right - left) * n)
     boxes = [_moved(h.box, top * n, left * n) for h in hits]
-
-    depth = np.full(shape, np.inf)
+    depth = np.full(((bottom - top) * n, (right - left) * n), np.inf)
     for hit, box in zip(hits, boxes, strict=True):
         np.minimum(depth[box], hit.t, out=depth[box])
-    inside = np.isfinite(depth)
     normal, colour = _melt(depth, hits, boxes, cones.colour[seen])
-    planes = _ray_planes(*camera.size, camera.focal, camera.horizon)
     window = (slice(top * n, bottom * n), slice(left * n, right * n))
-    view = np.stack([plane[window][inside] for plane in planes]).astype(np.float32)
-    layer = np.zeros((4, *shape), np.float32)
+    rays = [plane[window] for plane in _ray_planes(*camera.size, camera.focal, camera.horizon)]
+    return Surface(slice(top, bottom), slice(left, right), depth, normal, colour, rays)
+
+
+def draw_cones(picture: Pixels, camera: Camera, cones: Cones, sun: Array) -> None:
+    """Draws `cones` over `picture` (H, W, 3), in place; `sun` (3,) is the way its light travels."""
+    surface = see_cones(camera, cones)
+    if surface is not None:
+        lay_surface(picture, camera, surface, sun, np.isfinite(surface.t))
+
+
+def lay_surface(
+    picture: Pixels,
+    camera: Camera,
+    surface: Surface,
+    sun: Array,
+    inside: NDArray[np.bool_],
+    bright: Pixels | None = None,
+) -> None:
+    """Lays the samples `inside` (h, w) of a surface over `picture` (H, W, 3), in place.
+
+    `bright`: (P,) what the light of each of those samples is multiplied by, for shadows.
+    """
+    n = SUPERSAMPLE
+    view = np.stack([plane[inside] for plane in surface.rays]).astype(np.float32)
+    layer = np.zeros((4, *inside.shape), np.float32)
     to_sun = camera.axes @ unit(-sun)
-    layer[:3, inside] = _shade(normal[:, inside], view, colour[:, inside], to_sun)
+    light = _shade(surface.normal[:, inside], view, surface.colour[:, inside], to_sun)
+    layer[:3, inside] = light if bright is None else light * bright
     layer[3, inside] = 1.0
-    layer = layer.reshape(4, bottom - top, n, right - left, n)
+    height, width = inside.shape[0] // n, inside.shape[1] // n
+    layer = layer.reshape(4, height, n, width, n)
     small = sum(layer[:, :, i, :, j] for i in range(n) for j in range(n)) / np.float32(n * n)
     small = np.moveaxis(np.asarray(small), 0, -1)
-    target = picture[top:bottom, left:right]
+    target = picture[surface.rows, surface.columns]
     target *= 1.0 - small[..., 3:]
     target += small[..., :3]
 

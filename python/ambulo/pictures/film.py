@@ -74,7 +74,7 @@ def write_film(
     path = Path(path)
     terrain = Flat() if terrain is None else terrain
     _check_shots(recording, shots)
-    _check_size(size)
+    check_size(size)
     stage = Stage(recording, terrain, _points(waypoints))
     takes = _plan(recording, shots, stage, size, fps, view)
 
@@ -141,7 +141,8 @@ def _check_shots(recording: Recording, shots: Sequence[Shot]) -> None:
             )
 
 
-def _check_size(size: tuple[int, int]) -> None:
+def check_size(size: tuple[int, int]) -> None:
+    """ValueError unless `size` is a width and height that can be drawn."""
     if len(size) != 2 or min(size) < 32 or max(size) > 8192:
         raise ValueError(f"size must be (width, height), each 32 to 8192 pixels, not {size}")
 
@@ -176,7 +177,7 @@ def write_filmstrip(
     path = Path(path)
     terrain = Flat() if terrain is None else terrain
     _check_shots(recording, shots)
-    _check_size(cell)
+    check_size(cell)
     if poses < 1:
         raise ValueError(f"poses must be at least 1, not {poses}")
     stage = Stage(recording, terrain, np.zeros((0, 2)))

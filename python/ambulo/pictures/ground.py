@@ -46,16 +46,16 @@ def draw_ground(camera: Camera, terrain: Heights, sun: Array, *, grid: bool = Tr
         x, y, z, depth, top = _level_points(camera, terrain.level)
         light = np.ones((1, 1, 1), np.float32)
     else:
-        x, y, z, depth, slope_x, slope_z = _field_points(camera, terrain)
+        x, y, z, depth, slope_x, slope_z = field_points(camera, terrain)
         top = 0
-        light = _slope_light(slope_x, slope_z, sun)
+        light = slope_light(slope_x, slope_z, sun)
     picture = np.empty((camera.size[1], camera.size[0], 3), np.float32)
-    picture[:] = _sky(camera)[:, None]
+    picture[:] = sky(camera)[:, None]
     fog = (1.0 - np.exp(-((depth / HAZE) ** 2)))[..., None].astype(np.float32)
     pool = 1.0 + 0.05 * np.exp(-((depth / 9.0) ** 2))[..., None].astype(np.float32)
     base = GROUND * light * pool
     if grid:
-        lines = (_grid(camera, x, y, z, depth) * 0.75)[..., None]
+        lines = (grid_cover(camera, x, y, z, depth) * 0.75)[..., None]
         base = base + lines * (GRID * light - base)
     ground = base + fog * (HORIZON - base)
     if top == 0 and not isinstance(terrain, Flat):
@@ -66,7 +66,7 @@ def draw_ground(camera: Camera, terrain: Heights, sun: Array, *, grid: bool = Tr
     return GroundView(picture, x, z, y, depth, top)
 
 
-def _sky(camera: Camera) -> Pixels:
+def sky(camera: Camera) -> Pixels:
     """(H, 3) the sky's colour by row."""
     rows = np.arange(camera.size[1], dtype=np.float32) + 0.5
     up = np.clip((camera.horizon - rows) / camera.focal / 0.30, 0.0, 1.0)[:, None]
@@ -92,7 +92,7 @@ def _level_points(camera: Camera, level: float) -> tuple:
     return x, np.full((1, 1), level, np.float32), z, depth, top
 
 
-def _field_points(camera: Camera, terrain: Heights) -> tuple:
+def field_points(camera: Camera, terrain: Heights) -> tuple:
     """x, y, z, depth and slopes of the height field at every pixel; depth is FAR for sky.
 
     A picture column is a vertical plane (the camera looks level), so each column is walked from
@@ -128,7 +128,7 @@ def _field_points(camera: Camera, terrain: Heights) -> tuple:
     return x, y, z, depth, slope_x, slope_z
 
 
-def _slope_light(slope_x: Pixels, slope_z: Pixels, light: Array) -> Pixels:
+def slope_light(slope_x: Pixels, slope_z: Pixels, light: Array) -> Pixels:
     """(R, W, 1) brightness of sloping ground; level ground is 1."""
     sun = unit(-light)
     size = np.sqrt(1.0 + slope_x * slope_x + slope_z * slope_z)
@@ -136,7 +136,7 @@ def _slope_light(slope_x: Pixels, slope_z: Pixels, light: Array) -> Pixels:
     return np.clip(1.0 + 0.55 * (towards - sun[1]), 0.5, 1.15).astype(np.float32)[..., None]
 
 
-def _grid(camera: Camera, x: Pixels, y: Pixels, z: Pixels, depth: Pixels) -> Pixels:
+def grid_cover(camera: Camera, x: Pixels, y: Pixels, z: Pixels, depth: Pixels) -> Pixels:
     """(R, W) how much of each pixel is covered by the lines of the metre grid.
 
     The line pattern is integrated over the pixel's footprint (a box filter in closed form), so
@@ -243,13 +243,15 @@ def lay_shadow(ground: GroundView, camera: Camera, shadow: Shadow, strength: flo
         return
     box = (slice(top - ground.top, bottom - ground.top), slice(left, right))
     y = ground.y if ground.y.size == 1 else ground.y[box]
-    u, v = (
-        ground.x[box] * e[0] + ground.z[box] * e[2] + (y * e[1] - o)
-        for e, o in zip(*_in_cells(shadow), strict=True)
-    )
-    dark = strength * _bilinear(shadow.mask, v, u)[..., None]
+    dark = strength * shadow_at(shadow, ground.x[box], y, ground.z[box])[..., None]
     target = ground.picture[top:bottom, left:right]
     target += dark * (SHADOW - target)
+
+
+def shadow_at(shadow: Shadow, x: Pixels, y: Pixels, z: Pixels) -> Pixels:
+    """0 lit .. 1 dark at points of one shape, metres."""
+    u, v = (x * e[0] + z * e[2] + (y * e[1] - o) for e, o in zip(*_in_cells(shadow), strict=True))
+    return _bilinear(shadow.mask, v, u)
 
 
 def _in_cells(shadow: Shadow) -> tuple[Pixels, Pixels]:
