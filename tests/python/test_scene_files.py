@@ -12,11 +12,14 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SCHEMAS = {
     name: json.loads((ROOT / "schema" / f"{name}.schema.json").read_text(encoding="utf-8"))
-    for name in ("interaction", "scene")
+    for name in ("interaction", "scene", "script")
 }
 FILES = [
     *(("interaction", path) for path in sorted((ROOT / "starters/interactions").glob("*.toml"))),
-    *(("scene", path) for path in sorted((ROOT / "starters/scenes").glob("*.toml"))),
+    *(
+        ("script" if path.stem.endswith("-visit") else "scene", path)
+        for path in sorted((ROOT / "starters/scenes").glob("*.toml"))
+    ),
 ]
 
 

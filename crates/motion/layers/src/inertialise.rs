@@ -266,6 +266,18 @@ impl Inertialiser {
         self.known = 2.min(self.known + 1);
     }
 
+    /// Says what was shown instead of the pose that the last [`step`](Self::step) handed out, after
+    /// other layers: the next switch starts from there, at its speed. Without it, what they added
+    /// would be gone with their weights.
+    ///
+    /// # Errors
+    /// A pose with other joints or with a number that is not finite; then nothing has changed.
+    pub fn shown_instead(&mut self, pose: &Pose) -> Result<(), Refused> {
+        check(pose, self.offsets.len())?;
+        self.shown.local.clone_from(&pose.local);
+        Ok(())
+    }
+
     /// Whether something is left of an offset.
     pub fn is_running(&self) -> bool {
         self.running.is_some()

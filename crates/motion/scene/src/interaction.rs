@@ -117,16 +117,16 @@ pub enum Gait {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Clip {
-    /// A motion file beside this one (.bvh, .amc, .glb, .gltf); without one only the limbs below are
-    /// led, over the character's own motion.
+    /// A motion file (.keys, .bvh, .amc, .glb, .gltf), beside this one or in the folder `clips` beside
+    /// its folder; without one only the limbs below are led, over the character's own motion.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Play it as a mirror shows it.
     #[serde(default)]
     pub mirror: bool,
-    /// The legs go on walking by themselves; the clip has the upper body only.
+    /// When the legs go on by themselves, the clip having the upper body only.
     #[serde(default)]
-    pub walks: bool,
+    pub walks: Walks,
     /// When the clip begins to play.
     pub enter: f32,
     /// When the hold begins: hands on the handle, hips on the seat.
@@ -138,6 +138,23 @@ pub struct Clip {
     /// The hold is played again and again until the interaction is left.
     #[serde(default)]
     pub hold_repeats: bool,
+    /// Factor on the clip's own speed during the hold, 0.05 to 5: a door that opens at a walk.
+    #[serde(default = "one")]
+    pub hold_speed: f32,
+}
+
+/// When a character walks while a clip plays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Walks {
+    /// It stands where the clip begins, and the whole body is the clip's.
+    #[default]
+    Never,
+    /// During the hold it goes where the player wants: carrying something.
+    Hold,
+    /// All the time: through a door, behind a box.
+    Always,
 }
 
 /// A limb that is led to a point of the object.
@@ -285,6 +302,10 @@ pub enum When {
     PlayerStops,
     /// The player asks for it: putting down what was picked up.
     PlayerAsks,
+}
+
+fn one() -> f32 {
+    1.0
 }
 
 fn object_frame() -> String {

@@ -80,7 +80,7 @@ fn check_approach(approach: &Approach, kind: ObjectKind, found: &mut Found) {
 /// Whether its times can be held against others.
 fn check_clip(clip: &Clip, found: &mut Found) -> bool {
     if let Some(file) = &clip.file {
-        found.file("$.clip.file", file, &[".bvh", ".amc", ".glb", ".gltf"]);
+        found.file("$.clip.file", file, &[".keys", ".bvh", ".amc", ".glb", ".gltf"]);
     }
     if clip.mirror && clip.file.is_none() {
         found.add("$.clip.mirror", "there is no file to mirror");
@@ -91,6 +91,7 @@ fn check_clip(clip: &Clip, found: &mut Found) -> bool {
     for (key, time) in times {
         found.number(format!("$.clip.{key}"), time, 0.0, LONGEST, " s");
     }
+    found.number("$.clip.hold_speed", clip.hold_speed, 0.05, 5.0, "");
     if found.0.len() > before {
         return false;
     }
@@ -232,6 +233,7 @@ mod tests {
         let schemas = [
             ("interaction", schemars::schema_for!(Interaction)),
             ("scene", schemars::schema_for!(crate::Scene)),
+            ("script", schemars::schema_for!(crate::Script)),
         ];
         for (name, schema) in schemas {
             let path = format!("../../../schema/{name}.schema.json");

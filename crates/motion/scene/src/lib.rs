@@ -9,6 +9,7 @@
 //! Metres, kilograms, seconds, radians, newtons; right-handed, +Y up. An object's front is its +Z, its
 //! left +X; a yaw turns +Z towards +X. Unit quaternions as (x, y, z, w).
 
+mod actor;
 mod approach;
 mod curve;
 mod exact;
@@ -21,16 +22,25 @@ mod physics;
 mod reading;
 mod scene_check;
 mod scene_file;
+mod surroundings;
+mod visit;
 
+pub use actor::{
+    About, Act, Acted, Actor, Body, BodyError, Led, Move, MoveError, Moves, Phase, Told, Wish,
+};
 pub use approach::{Going, Walk, Why};
 pub use curve::weight;
 pub use ground::GroundPieces;
 pub use interaction::{
     Action, Approach, Clip, Exit, Gait, Hand, INTERACTION_FORMAT, Interaction, Limb, Target,
-    Trigger, Volume, When,
+    Trigger, Volume, Walks, When,
 };
 pub use object::{Button, Chair, Door, Kind, Lever, MovableBox, Object, ObjectKind, Side};
 pub use parts::{Frame, Motion, Part, Solid};
 pub use physics::{Hit, Moved, Physics, Push, Refused, STEP, Step, What};
 pub use reading::{FileError, Problem};
 pub use scene_file::{Ground, GroundKind, SCENE_FORMAT, Scene, Spawn, Wall};
+pub use surroundings::{Deed, Surroundings};
+pub use visit::{
+    Happened, Interruptions, Measured, SCRIPT_FORMAT, Script, Task, Visit, VisitError,
+};

@@ -95,6 +95,9 @@ pub struct Door {
     /// What slows the leaf, N·m·s/rad, 0.01 to 1000.
     #[serde(default = "door_damping")]
     pub damping: f32,
+    /// What shuts it when nobody holds it, N·m/rad, 0 to 1000; 0: it stays as it is.
+    #[serde(default)]
+    pub closer: f32,
 }
 
 /// Something to sit on that does not move.

@@ -49,6 +49,8 @@ pub enum Motion {
         limits: [f32; 2],
         /// N·m·s/rad.
         damping: f32,
+        /// Of a spring that turns it back to 0 when nothing drives it, N·m/rad; 0: none.
+        closer: f32,
         /// Kilograms.
         mass: f32,
     },
@@ -151,8 +153,8 @@ impl Door {
         let tall = height - Self::GAP;
         let leaf = [-side * width * 0.5, Self::GAP + tall * 0.5, 0.0];
         let leaf = solid(leaf, [width, tall, thickness]);
-        let (limits, damping, mass) = (self.limits, self.damping, self.mass);
-        let hinge = Motion::Hinge { axis: Vec3::Y * side, limits, damping, mass };
+        let (limits, damping, mass, closer) = (self.limits, self.damping, self.mass, self.closer);
+        let hinge = Motion::Hinge { axis: Vec3::Y * side, limits, damping, closer, mass };
         vec![
             part("frame", Vec3::ZERO, vec![post(-off), post(off), lintel], Motion::Fixed),
             part("leaf", Vec3::X * side * width * 0.5, vec![leaf], hinge),
@@ -265,7 +267,8 @@ impl Lever {
         let &Lever { height, length, limits, damping } = self;
         let post = solid([0.0, height * 0.5, 0.0], [0.1, height, 0.1]);
         let arm = solid([0.0, length * 0.5, 0.0], [0.03, length, 0.03]);
-        let motion = Motion::Hinge { axis: Vec3::X, limits, damping, mass: Self::MASS };
+        let (axis, closer, mass) = (Vec3::X, 0.0, Self::MASS);
+        let motion = Motion::Hinge { axis, limits, damping, closer, mass };
         vec![
             part("post", Vec3::ZERO, vec![post], Motion::Fixed),
             part("arm", Vec3::Y * height, vec![arm], motion),
@@ -300,6 +303,7 @@ mod tests {
             limits,
             mass,
             damping,
+            closer: 0.0,
         })
     }
 

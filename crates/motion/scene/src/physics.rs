@@ -5,6 +5,7 @@
 //! build: [`Physics::hash`].
 
 mod act;
+mod around;
 mod build;
 mod person;
 
@@ -85,6 +86,8 @@ pub struct Physics {
     world: PhysicsWorld,
     ground: GroundPieces,
     things: Vec<Thing>,
+    /// From where to where, and half their thickness.
+    walls: Vec<(Vec2, Vec2, f32)>,
     person: Option<person::Person>,
     /// Seconds since the last fixed step, in [0, STEP).
     since: f64,

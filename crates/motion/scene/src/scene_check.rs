@@ -119,6 +119,7 @@ fn check_door(door: &Door, path: &str, found: &mut Found) {
     number("handle_height", door.handle_height, 0.3, 2.0, " m");
     number("mass", door.mass, 1.0, 500.0, " kg");
     number("damping", door.damping, 0.01, 1000.0, " N·m·s/rad");
+    number("closer", door.closer, 0.0, 1000.0, " N·m/rad");
     if door.handle_height >= door.height {
         found.add(format!("{path}.handle_height"), "the handle is not on the leaf");
     }

@@ -2,9 +2,9 @@
 
 use ambulo_scene::{FileError, Interaction, Scene};
 
-const SIT: &str = include_str!("../../../../starters/interactions/sit.toml");
-const DOOR: &str = include_str!("../../../../starters/interactions/open_door_front_right.toml");
-const CARRY: &str = include_str!("../../../../starters/interactions/pick_up_box.toml");
+const SIT: &str = include_str!("files/sit.toml");
+const DOOR: &str = include_str!("files/open_door.toml");
+const CARRY: &str = include_str!("files/pick_up_box.toml");
 const SCENE: &str = include_str!("../../../../starters/scenes/playground.toml");
 
 /// The text of the error has one line for each problem: `path: reason`.

@@ -63,8 +63,9 @@ fn hands_reach_what_they_take() {
                 let flat = Vec2::new(at.x, at.z);
                 let side = flat.dot(left);
                 match target.limb {
-                    Limb::LeftHand => assert!(side > -0.01, "{file}: left hand at {side}"),
-                    Limb::RightHand => assert!(side < 0.01, "{file}: right hand at {side}"),
+                    // The far hand crosses the body, but not by more than an arm allows.
+                    Limb::LeftHand => assert!(side > -0.15, "{file}: left hand at {side}"),
+                    Limb::RightHand => assert!(side < 0.15, "{file}: right hand at {side}"),
                     Limb::Hips => assert!(flat.length() < 0.6, "{file}: hips {flat}"),
                     _ => {}
                 }

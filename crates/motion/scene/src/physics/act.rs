@@ -89,13 +89,25 @@ impl Physics {
         }
     }
 
-    /// Lets a hinge swing, a button come back.
+    /// Presses a button so far of its way in (0 to 1), with at most that force in newtons, until
+    /// [`Physics::release`].
+    ///
+    /// # Errors
+    /// No such object, not a button, numbers that are not finite, a negative force.
+    pub fn press(&mut self, object: usize, depth: f32, most: f32) -> Result<(), Refused> {
+        match self.motion(object)? {
+            Motion::Slide { limits: [_, travel], .. } => self.drive(object, depth * travel, most),
+            _ => Err(self.things[object].refused()),
+        }
+    }
+
+    /// Lets a hinge swing or close by itself, a button come back.
     ///
     /// # Errors
     /// No such object, or one without a joint.
     pub fn release(&mut self, object: usize) -> Result<(), Refused> {
         let (axis, stiffness, damping) = match self.motion(object)? {
-            Motion::Hinge { damping, .. } => (JointAxis::AngX, 0.0, damping),
+            Motion::Hinge { damping, closer, .. } => (JointAxis::AngX, closer, damping),
             Motion::Slide { stiffness, mass, .. } => {
                 (JointAxis::LinX, stiffness, critical(stiffness, mass))
             }

@@ -75,7 +75,9 @@ pub(super) fn build(scene: &Scene) -> Physics {
     world.integration_parameters.dt = 0.0;
     world.step();
     world.integration_parameters.dt = STEP;
-    Physics { world, ground, things, person: None, since: 0.0 }
+    let walls = scene.walls.iter();
+    let walls = walls.map(|w| (w.start.into(), w.end.into(), 0.5 * w.thickness)).collect();
+    Physics { world, ground, things, walls, person: None, since: 0.0 }
 }
 
 fn surface(shape: ColliderBuilder, what: What, groups: InteractionGroups) -> ColliderBuilder {
@@ -205,13 +207,13 @@ fn add_part(
 fn hang(part: &Part) -> Option<GenericJoint> {
     let anchor = to_vector(part.rest.translation);
     match part.motion {
-        Motion::Hinge { axis, limits, damping, .. } => {
+        Motion::Hinge { axis, limits, damping, closer, .. } => {
             let joint = RevoluteJointBuilder::new(to_vector(axis))
                 .local_anchor1(anchor)
                 .limits(limits)
                 .contacts_enabled(false)
                 .motor_model(MotorModel::ForceBased)
-                .motor_velocity(0.0, damping);
+                .motor_position(0.0, closer, damping);
             Some(joint.into())
         }
         Motion::Slide { axis, limits, stiffness, mass } => {

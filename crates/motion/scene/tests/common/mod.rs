@@ -1,6 +1,8 @@
 //! Small scenes.
 #![allow(dead_code)]
 
+pub mod playground;
+
 use ambulo_scene::{Physics, STEP, Scene};
 
 /// Of a known run; written down once, the same on every machine since.

@@ -1,0 +1,221 @@
+//! The second half of a frame: from the network's pose to the one that is shown.
+
+use ambulo_layers::{Ground, Reach};
+use ambulo_rig::glam::Quat;
+use ambulo_rig::{Pose, Transform};
+
+use super::acting::{Acting, Phase, placed};
+use super::{Actor, Led, Source, Stage};
+use crate::interaction::{Limb, Target, Walks};
+use crate::object::yawed;
+use crate::surroundings::Surroundings;
+
+/// A hand within this share of the farthest that it reaches slows the clip, which stops there.
+const STRETCH: f32 = 0.04;
+/// From this weight on a hand is expected at its target.
+const DUE: f32 = 0.85;
+
+impl Actor {
+    /// The second half of a frame of `dt` seconds, after the world has moved on: makes the pose.
+    /// Allocates nothing.
+    pub fn pose(&mut self, dt: f32, around: &mut dyn Surroundings) -> &Pose {
+        self.network.swap(0, 1);
+        self.controller.pose(&mut self.network[0]);
+        self.blend(dt, around);
+        self.shown.to_global(&self.body.skeleton, &mut self.global);
+        self.led.clear();
+        let acting = match self.stage {
+            Stage::Acting(acting) => Some(acting),
+            _ => None,
+        };
+        self.lead_hips(acting, around);
+        // What is shown when something else is played: without what the feet's own layer remembers.
+        self.clip.local.clone_from(&self.shown.local);
+        self.place_feet(acting, dt, around);
+        self.carry(around);
+        self.lead_hands(acting, around);
+        self.turn_head(acting, dt, around);
+        for (joint, upper) in self.body.upper.iter().enumerate() {
+            if *upper {
+                self.clip.local[joint] = self.shown.local[joint];
+            }
+        }
+        let _ = self.inertialiser.shown_instead(&self.clip);
+        &self.shown
+    }
+
+    /// Clip over network, and what is left of the transition.
+    fn blend(&mut self, dt: f32, around: &dyn Surroundings) {
+        let (source, time) = match self.stage {
+            Stage::Acting(acting) => (self.source_of(&acting), acting.time),
+            _ => (Source::Network, 0.0),
+        };
+        // Taken out and put back: an empty pose allocates nothing.
+        let none = || Pose { local: vec![] };
+        let [mut now, mut before] = std::mem::replace(&mut self.source, [none(), none()]);
+        self.write_source(source, time, 0, around, &mut now);
+        if (source != self.played.0 || self.jumped) && dt > 0.0 {
+            self.write_source(source, time - self.tick, 1, around, &mut before);
+            // Refused only for numbers that are not finite, which no pose here has.
+            let _ = self.inertialiser.switch(&before, &now, dt);
+        }
+        (self.played, self.jumped) = ((source, time), false);
+        let _ = self.inertialiser.step(&now, dt, &mut self.shown);
+        self.source = [now, before];
+    }
+
+    fn source_of(&self, acting: &Acting) -> Source {
+        let one = &self.moves.all()[acting.which];
+        if one.motion.is_none() {
+            return Source::Network;
+        }
+        match (one.interaction.clip.walks, acting.phase) {
+            (Walks::Always, _) | (Walks::Hold, Phase::Hold) => Source::Upper(acting.which),
+            _ => Source::Clip(acting.which),
+        }
+    }
+
+    /// A source at a second of its clip; `network`: 0 for this frame's pose, 1 for the one before.
+    fn write_source(
+        &self,
+        source: Source,
+        time: f32,
+        network: usize,
+        around: &dyn Surroundings,
+        out: &mut Pose,
+    ) {
+        let walking = &self.network[network];
+        let (Source::Clip(which) | Source::Upper(which)) = source else {
+            out.local.clone_from(&walking.local);
+            return;
+        };
+        let one = &self.moves.all()[which];
+        let (Some(motion), Stage::Acting(acting)) = (&one.motion, self.stage) else {
+            out.local.clone_from(&walking.local);
+            return;
+        };
+        motion.as_recorded(f64::from(time), out);
+        let root = self.controller.root();
+        if let Source::Clip(_) = source {
+            let (place, yaw) = acting.anchor(&one.interaction, root, time);
+            let height = around.terrain().height(place.x, place.y);
+            out.local[0] = placed((place, yaw), height) * out.local[0];
+            return;
+        }
+        self.lay_over(walking, yawed(root.yaw), out);
+    }
+
+    /// Puts the legs of a walking pose under a clip, whose upper body stays as it is in the
+    /// character's frame.
+    fn lay_over(&self, walking: &Pose, turn: Quat, out: &mut Pose) {
+        let joints = self.body.skeleton.joints();
+        let rotation = |pose: &Pose, joint: usize| {
+            let parents = std::iter::successors(Some(joint), |&joint| joints[joint].parent);
+            parents.fold(Quat::IDENTITY, |turn, joint| pose.local[joint].rotation * turn)
+        };
+        for (joint, own) in joints.iter().enumerate() {
+            let Some(parent) = own.parent else { continue };
+            if self.body.upper[joint] && !self.body.upper[parent] {
+                let wanted = turn * rotation(out, joint);
+                let local = rotation(walking, parent).inverse() * wanted;
+                out.local[joint].rotation = local.normalize();
+            }
+        }
+        for joint in (0..joints.len()).filter(|&joint| !self.body.upper[joint]) {
+            out.local[joint] = walking.local[joint];
+        }
+    }
+
+    /// Where a target is to be, if the acting leads that limb now.
+    fn wanted(
+        &self,
+        acting: Option<Acting>,
+        limb: Limb,
+        around: &dyn Surroundings,
+    ) -> Option<(f32, Transform, bool)> {
+        let acting = acting?;
+        let target: &Target = self.moves.all()[acting.which].interaction.target(limb)?;
+        let weight = target.weight(acting.time);
+        let frame = around.frame(acting.object, &target.on)?;
+        (weight > 0.0).then(|| (weight, frame * target.place(), target.rotation.is_some()))
+    }
+
+    fn lead_hips(&mut self, acting: Option<Acting>, around: &dyn Surroundings) {
+        let Some((weight, wanted, turned)) = self.wanted(acting, Limb::Hips, around) else {
+            return;
+        };
+        let hips = self.body.hips;
+        let parent = self.body.skeleton.joints()[hips].parent;
+        let parent = parent.map_or(Transform::IDENTITY, |parent| self.global[parent]);
+        let own = self.global[hips];
+        let to = if turned { wanted } else { Transform::new(wanted.translation, own.rotation) };
+        self.shown.local[hips] = parent.inverse() * own.interpolate(to, weight);
+        self.shown.update_global(&self.body.skeleton, hips, &mut self.global);
+        let reached = self.global[hips];
+        self.led.push(Led { limb: Limb::Hips, weight, wanted, reached, turned });
+    }
+
+    fn place_feet(&mut self, acting: Option<Acting>, dt: f32, around: &dyn Surroundings) {
+        let root = self.controller.root();
+        let clip = match (self.played.0, acting) {
+            (Source::Clip(which), Some(acting)) => Some((which, acting)),
+            _ => None,
+        };
+        let terrain = around.terrain();
+        let (feet, contacts, level) = match clip {
+            Some((which, acting)) => {
+                let one = &self.moves.all()[which];
+                let (place, _) = acting.anchor(&one.interaction, root, acting.time);
+                let level = Some(terrain.height(place.x, place.y));
+                (&self.body.standing_feet, one.contacts(acting.time), level)
+            }
+            None => (&self.body.feet, self.controller.contacts(), None),
+        };
+        let ground = Ground { terrain, level };
+        let skeleton = &self.body.skeleton;
+        let (pose, global) = (&mut self.shown, &mut self.global);
+        feet.step(skeleton, &mut self.feet, contacts, &ground, dt, pose, global);
+    }
+
+    fn lead_hands(&mut self, acting: Option<Acting>, around: &dyn Surroundings) {
+        self.pace = 1.0;
+        for (side, limb) in [Limb::LeftHand, Limb::RightHand].into_iter().enumerate() {
+            let Some((weight, wanted, turned)) = self.wanted(acting, limb, around) else {
+                continue;
+            };
+            let arm = self.body.arms[side];
+            let [shoulder, _, wrist] = arm.joints();
+            let own = self.palm(side);
+            let palm =
+                if turned { wanted } else { Transform::new(wanted.translation, own.rotation) };
+            let goal = palm * self.body.palms[side].inverse();
+            let asked = Reach {
+                position: goal.translation,
+                rotation: turned.then_some(goal.rotation),
+                pole: None,
+                weight,
+            };
+            let distance = self.global[shoulder].translation.distance(goal.translation);
+            let most = arm.span(&self.global).exact;
+            let leaves = acting.is_some_and(|acting| acting.phase == Phase::Exit);
+            if !leaves {
+                // Only who should be there already: a hand on its way may be far from it.
+                let due = ((weight - DUE) / (1.0 - DUE)).clamp(0.0, 1.0);
+                let over = (distance / most - 1.0 + STRETCH) / STRETCH * due;
+                self.pace = self.pace.min((1.0 - over).clamp(0.0, 1.0));
+            }
+            arm.reach(&self.body.skeleton, &asked, &mut self.shown, &mut self.global);
+            let reached = self.global[wrist] * self.body.palms[side];
+            self.led.push(Led { limb, weight, wanted, reached, turned });
+        }
+    }
+
+    fn turn_head(&mut self, acting: Option<Acting>, dt: f32, around: &dyn Surroundings) {
+        let look = self.wanted(acting, Limb::Look, around);
+        let target = look.map(|(_, wanted, _)| wanted.translation);
+        let weight = look.map_or(0.0, |(weight, ..)| weight);
+        let (skeleton, pose) = (&self.body.skeleton, &mut self.shown);
+        let (state, global) = (&mut self.look, &mut self.global);
+        self.body.look.step(skeleton, state, target, weight, dt, pose, global);
+    }
+}
