@@ -151,6 +151,8 @@ bench: setup $(VENV)/.bench ## Measure, beside what others make (ARGS=... goes t
 	@for bench in benches/*.py; do \
 		printf '\n==> %s\n' "$$bench"; $(BIN)/python "$$bench" $(ARGS) || exit 1; \
 	done
+	$(call say,Layers over a pose: microseconds a frame)
+	cargo bench --locked --quiet -p ambulo-layers --bench layers -- $(ARGS)
 	$(call say,Creatures: steps a second)
 	$(BIN)/ambulo bench evolve
 

@@ -28,6 +28,7 @@ class Controller:
         facing: float = 0.0,
         responsive: bool = False,
         tuning: str | None = None,
+        place_feet: bool = True,
     ) -> None: ...
     def set_areas(
         self,
@@ -53,6 +54,8 @@ class Controller:
     def root(self) -> tuple[float, float, float, float]: ...
     @property
     def contacts(self) -> list[float]: ...
+    @property
+    def planted(self) -> list[bool]: ...
     @property
     def phase(self) -> float: ...
     @property

@@ -44,6 +44,7 @@ class Controller:
         facing: float = 0.0,
         responsive: bool = False,
         tuning: Mapping[str, Any] | None = None,
+        place_feet: bool = True,
     ) -> None:
         """Stand at `start` (x, z metres), facing a yaw (radians, 0 = +Z, positive towards +X).
 
@@ -55,6 +56,12 @@ class Controller:
             responsive: turn and start sooner; feet slide a little more.
             tuning: instead of the model's own (`Model.tuning`): fields as `docs/models.md` lists
                 them, those left out as published.
+            place_feet: where the tuning holds feet (`hold_feet`), leave that to the layer of
+                `ambulo-layers`: it holds the balls of the feet, bends the toes, keeps heels and
+                toes above the ground and sinks the hips where a leg is too short. Only what is
+                shown differs: root, phase and contacts are the same to the last bit. Without, and
+                for skeletons that have no thighs, feet and toes by name, the controller's own,
+                simpler hold stays.
 
         Raises:
             ModelError: the model's layout or skeleton is not one that this version controls, or a
@@ -69,6 +76,7 @@ class Controller:
                 facing=facing,
                 responsive=responsive,
                 tuning=None if tuning is None else json.dumps(dict(tuning)),
+                place_feet=place_feet,
             )
         except ValueError as error:
             raise ModelError(str(error)) from error
@@ -142,6 +150,14 @@ class Controller:
     def contacts(self) -> list[float]:
         """Left heel, left toe, right heel, right toe: 0 in the air, 1 on the ground."""
         return self.core.contacts
+
+    @property
+    def planted(self) -> list[bool]:
+        """Whether the left and the right foot are held where they stand.
+
+        Without placed feet: whether the contact of its toes is above one half.
+        """
+        return self.core.planted
 
     @property
     def phase(self) -> float:

@@ -25,6 +25,8 @@ from ambulo.evaluate.walk import summarise, walk_laps
 from ambulo.recording import Recording
 from conftest import follower
 
+STARTER = Path(__file__).parents[2] / "starters" / "human.safetensors"
+
 SMALL = """
 name = "small"
 reach = 0.5
@@ -137,6 +139,17 @@ class TestMetrics:
         slow = replace(recording(root), fps=30.0)
         slow.positions[:, 0, 1] = 0.54
         assert metrics.foot_skate(slow, flat, [0, 0], floor) == pytest.approx(0.5, abs=1e-4)
+
+    def test_planted_feet_slide_between_two_frames_that_they_stand_in(self) -> None:
+        path = np.array([0.0, 0.5, 0.51, 0.51, 0.9, 0.93, 2.0])
+        toe = recording(np.stack([path, 0.0 * path], axis=1))
+        left = np.array([False, True, True, True, True, False, True])
+        planted = np.stack([left, np.zeros(7, bool)], axis=1)
+        # 1, 0 and 39 cm a frame; what happens before it stands and after is none of it.
+        assert metrics.planted_slide(toe, planted, [0, 0]) == pytest.approx(40.0 / 3, abs=1e-4)
+        slow = replace(toe, fps=30.0)
+        assert metrics.planted_slide(slow, planted, [0, 0]) == pytest.approx(20.0 / 3, abs=1e-4)
+        assert metrics.planted_slide(toe, planted & False, [0, 0]) == 0.0
 
     def test_the_floor_is_where_feet_are_in_contact(self) -> None:
         toe = recording(np.zeros((9, 2)))
@@ -275,7 +288,8 @@ class TestWalking:
         lap_keys = {
             "time_s", "waypoints_reached", "path_error_m", "heading_error_deg", "mean_speed_ratio",
             "foot_skate_cm_per_frame", "ms_per_frame_mean", "ms_per_frame_sd",
-            "path_error_max_m", "foot_skate_cm_per_s",
+            "path_error_max_m", "foot_skate_cm_per_s", "planted_slide_cm_per_frame",
+            "planted_share",
         }  # fmt: skip
         assert len(summary["laps"]) == 2 and lap_keys <= set(summary["laps"][0])
         from ambulo import read_motion
@@ -428,6 +442,47 @@ class TestController:
             for _ in range(120):
                 assert character.step(1 / 60, (0.0, speed), gait=gait).event is None
             assert character.core.gaits[:5] == pytest.approx(expected, abs=1e-4), (gait, speed)
+
+    def test_placed_feet_change_nothing_but_the_legs(self, toys: Model) -> None:
+        terrain = Terrain.hills(3)
+        characters = [Controller(toys, terrain=terrain, place_feet=p) for p in (True, False)]
+        most = 0.0
+        for frame in range(240):
+            for walker in characters:
+                # At no multiple of the fixed step, and with a turn.
+                walker.step(1 / 50, (math.sin(frame / 50), math.cos(frame / 50)))
+            placed, own = characters
+            assert placed.root == own.root and placed.phase == own.phase
+            assert placed.contacts == own.contacts
+            assert np.array_equal(placed.core.trajectory(), own.core.trajectory())
+            most = max(most, float(np.abs(placed.positions() - own.positions()).max()))
+        assert 1e-3 < most < 0.5, most
+
+    def test_feet_are_held_where_they_stand(self) -> None:
+        model = load_model(STARTER)
+        legs = [model.names.index(f"{side}Toe") for side in ("Left", "Right")]
+        character, terrain = Controller(model, terrain=Terrain.hills(3)), Terrain.hills(3)
+        slides, before, stood = [], character.positions(), [False, False]
+        for frame in range(300):
+            character.step(1 / 60, (0.0, 1.4))
+            now, planted = character.positions(), character.planted
+            for toe, a, b in zip(legs, planted, stood, strict=True):
+                if a and b:
+                    slides.append(math.hypot(*(now[toe] - before[toe])[[0, 2]]))
+            floor = terrain.height(now[legs, 0], now[legs, 2])
+            assert frame < 2 or (now[legs, 1] - floor).min() > 0.02, "the ball is above the ground"
+            before, stood = now, planted
+        assert len(slides) > 150 and np.mean(slides) < 2e-4 and np.max(slides) < 1e-3
+
+    def test_nobody_holds_feet_that_are_not_to_be_held(self, toys: Model) -> None:
+        tuning, shown = {"hold_feet": False}, []
+        for place in (True, False):
+            character = Controller(toys, tuning=tuning, place_feet=place)
+            for _ in range(60):
+                character.step(1 / 60, (0.0, 1.0))
+            shown.append(character.positions())
+            assert character.planted == [contact > 0.5 for contact in character.contacts[1::2]]
+        assert np.array_equal(*shown)
 
     def test_a_tuning_of_ones_own(self, toys: Model) -> None:
         for tuning, message in [

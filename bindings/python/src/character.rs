@@ -13,6 +13,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors::value_error;
+use crate::feet::Feet;
 use crate::model::Model;
 
 #[derive(Clone)]
@@ -89,6 +90,8 @@ pub struct Controller {
     areas: Areas,
     pose: Pose,
     global: Vec<Transform>,
+    /// The layer that places the feet, where it does.
+    feet: Option<Feet>,
 }
 
 fn gait_named(name: &str) -> PyResult<Gait> {
@@ -125,7 +128,7 @@ fn rows<const N: usize>(rows: impl ExactSizeIterator<Item = [f32; N]>) -> Array2
 #[pymethods]
 impl Controller {
     #[new]
-    #[pyo3(signature = (model, *, terrain = None, start = (0.0, 0.0), facing = 0.0, responsive = false, tuning = None))]
+    #[pyo3(signature = (model, *, terrain = None, start = (0.0, 0.0), facing = 0.0, responsive = false, tuning = None, place_feet = true))]
     fn new(
         model: &Model,
         terrain: Option<&Terrain>,
@@ -133,6 +136,7 @@ impl Controller {
         facing: f32,
         responsive: bool,
         tuning: Option<&str>,
+        place_feet: bool,
     ) -> PyResult<Self> {
         let model = control::Model::new(model.bundle.clone()).map_err(value_error)?;
         let ground = terrain.map_or(Ground::Flat(rig::Flat(0.0)), |t| t.ground.clone());
@@ -142,15 +146,19 @@ impl Controller {
                 .map_err(|error| PyValueError::new_err(format!("tuning: {error}")))?,
             None => model.tuning(),
         };
-        let tuning: Tuning = if responsive { tuning.responsive() } else { tuning };
+        let mut tuning: Tuning = if responsive { tuning.responsive() } else { tuning };
+        let placed = place_feet && tuning.hold_feet && tuning.is_valid();
+        let feet = if placed { Feet::new(&model, &tuning) } else { None };
+        // The layer does it on the pose handed out; what is not a person keeps the controller's.
+        tuning.hold_feet &= feet.is_none();
         let world = World { terrain: ground.as_terrain(), areas: &areas };
         let start = Vec2::new(start.0, start.1);
         let pose = model.skeleton().rest_pose();
         let global = vec![Transform::IDENTITY; model.skeleton().len()];
         let controller =
             control::Controller::new(model, tuning, start, facing, &world).map_err(value_error)?;
-        let mut controller = Self { controller, ground, areas, pose, global };
-        controller.refresh();
+        let mut controller = Self { controller, ground, areas, pose, global, feet };
+        controller.refresh(None);
         Ok(controller)
     }
 
@@ -209,7 +217,10 @@ impl Controller {
         };
         let world = World { terrain: self.ground.as_terrain(), areas: &self.areas };
         let step = self.controller.step(dt, &intent, &world);
-        self.refresh();
+        // What is held stays as it was shown.
+        if step.steps > 0 || !matches!(step.event, Some(Event::Held(_))) {
+            self.refresh(Some(dt));
+        }
         Ok((step.steps, step.event.map(event_text)))
     }
 
@@ -245,6 +256,13 @@ impl Controller {
         self.controller.contacts()
     }
 
+    /// Whether the left and the right foot stand: held by the layer, else their toes in contact.
+    #[getter]
+    fn planted(&self) -> [bool; 2] {
+        let [_, left, _, right] = self.controller.contacts();
+        self.feet.as_ref().map_or([left, right].map(|toe| toe > 0.5), Feet::held)
+    }
+
     /// Radians, [0, 2π).
     #[getter]
     fn phase(&self) -> f32 {
@@ -269,9 +287,14 @@ impl Controller {
 }
 
 impl Controller {
-    fn refresh(&mut self) {
-        self.controller.pose(&mut self.pose);
-        self.pose.to_global(self.controller.model().skeleton(), &mut self.global);
+    /// Takes over the pose, and places its feet `dt` seconds after the last one.
+    fn refresh(&mut self, dt: Option<f32>) {
+        let Self { controller, ground, pose, global, feet, .. } = self;
+        controller.pose(pose);
+        pose.to_global(controller.model().skeleton(), global);
+        if let (Some(feet), Some(dt)) = (feet, dt) {
+            feet.place(controller, ground.as_terrain(), dt, pose, global);
+        }
     }
 }
 

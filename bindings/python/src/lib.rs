@@ -4,6 +4,7 @@ mod character;
 mod creature;
 mod dataset;
 mod errors;
+mod feet;
 mod model;
 mod motion;
 

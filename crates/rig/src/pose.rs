@@ -87,9 +87,24 @@ impl Pose {
     /// # Panics
     /// When the pose, the skeleton and `global` differ in length.
     pub fn update_global(&self, skeleton: &Skeleton, first: usize, global: &mut [Transform]) {
+        self.update_range(skeleton, first..skeleton.len(), global);
+    }
+
+    /// [`Pose::update_global`] of some joints: all that is needed where none behind them hangs on
+    /// what was changed, as none of a leg's does on the other leg.
+    ///
+    /// # Panics
+    /// When the pose, the skeleton and `global` differ in length, or the joints are not among them.
+    pub fn update_range(
+        &self,
+        skeleton: &Skeleton,
+        joints: std::ops::Range<usize>,
+        global: &mut [Transform],
+    ) {
         assert_eq!(self.local.len(), skeleton.len(), "pose and skeleton differ in joints");
         assert_eq!(global.len(), skeleton.len(), "buffer and skeleton differ in joints");
-        for (index, joint) in skeleton.joints().iter().enumerate().skip(first) {
+        let first = joints.start;
+        for (index, joint) in (first..).zip(&skeleton.joints()[joints]) {
             global[index] = match joint.parent {
                 Some(parent) => global[parent] * self.local[index],
                 None => self.local[index],

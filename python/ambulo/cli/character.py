@@ -172,6 +172,11 @@ def _largest_change(a: Model, b: Model) -> float:
 )  # fmt: skip
 @click.option("--responsive", is_flag=True, help="Follow wishes sooner; feet slide a little more.")
 @click.option(
+    "--place-feet/--own-feet", default=True, show_default=True,
+    help="Feet held by the layer of feet (planted balls stay, nothing below the ground), or by the "
+    "controller's own, simpler hold. The path is the same.",
+)  # fmt: skip
+@click.option(
     "-o", "--output", type=click.Path(file_okay=False, path_type=Path),
     help="Folder for the motion (BVH), pictures (PNG), film and summary.json. "
     "Without it nothing is written.",
@@ -188,6 +193,7 @@ def walk(
     terrain: str,
     seed: int,
     responsive: bool,
+    place_feet: bool,
     output: Path | None,
     film: str,
     as_json: bool,
@@ -204,7 +210,7 @@ def walk(
     """
     _walk(
         path, load_model(path), load_track(track), Terrain.named(terrain, seed), terrain, laps,
-        responsive=responsive, output=output, film=film, as_json=as_json,
+        responsive=responsive, place_feet=place_feet, output=output, film=film, as_json=as_json,
     )  # fmt: skip
 
 
@@ -217,6 +223,7 @@ def _walk(
     laps: int,
     *,
     responsive: bool,
+    place_feet: bool,
     output: Path | None,
     film: str,
     as_json: bool,
@@ -229,8 +236,9 @@ def _walk(
     with bar("walking", laps, unit="laps") as progress:
         try:
             for lap in walk_laps(
-                character, track, ground, laps, responsive=responsive, on_progress=progress
-            ):
+                character, track, ground, laps,
+                responsive=responsive, place_feet=place_feet, on_progress=progress,
+            ):  # fmt: skip
                 # The first lap is shown in full; of the others the figures and the path are enough.
                 finished.append(lap if not finished else lap.without_motion())
         except KeyboardInterrupt:
@@ -276,6 +284,7 @@ def _print(summary: dict[str, Any], written: list[Path]) -> None:
         ("heading °", "heading_error_deg", ".1f"),
         ("speed", "mean_speed_ratio", ".2f"),
         ("skate cm", "foot_skate_cm_per_frame", ".2f"),
+        ("planted cm", "planted_slide_cm_per_frame", ".3f"),
         ("ms", "ms_per_frame_mean", ".3f"),
     ]
     for title, _, _ in columns:

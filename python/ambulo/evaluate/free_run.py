@@ -101,7 +101,7 @@ def _endure(
     faults = Faults(model)
     frames = round(settings.minutes * 60.0 * FPS)
     commands = islice(random_commands(seed, settings.gaits), frames)
-    for frame, moment in enumerate(_moments(Controller(model), commands), 1):
+    for frame, moment in enumerate(_moments(Controller(model, place_feet=False), commands), 1):
         faults.watch(moment)
         if frame % FPS == 0:
             advance(1.0)
@@ -129,7 +129,7 @@ def _measure(
     tuning = {**model.tuning, "hold_feet": settings.hold_feet}
     for seed in range(settings.seeds):
         heading = float(np.random.default_rng([seed, 1]).uniform(-np.pi, np.pi))
-        character = Controller(model, facing=heading, tuning=tuning)
+        character = Controller(model, facing=heading, tuning=tuning, place_feet=False)
         stirring = islice(random_commands(seed, settings.gaits), round(STIR * FPS))
         motions.append(_steady_motion(character, stirring, steady, heading, body))
         headings.append(heading)

@@ -9,6 +9,7 @@ from ambulo.evaluate.track import Track
 from ambulo.recording import Heights, Recording
 
 Array = NDArray[np.floating]
+Flags = NDArray[np.bool_]
 
 # Height above which a foot counts as off the ground (Zhang et al. 2018, MANN, section 8), metres.
 SKATE_HEIGHT = 0.025
@@ -49,6 +50,22 @@ def skate(feet: Array, above: Array, fps: float) -> Array:
     v = np.hypot(step[..., 0], step[..., 1]) * fps / 60.0
     weight = np.clip(2.0 - 2.0 ** (h / SKATE_HEIGHT), 0.0, None)
     return v * weight * 100.0
+
+
+def planted_slide(recording: Recording, planted: Flags, joints: list[int]) -> float:
+    """Mean slide of a planted foot in centimetres per 60 Hz frame.
+
+    `joints` are the balls (toe joints) of the left and the right foot, `planted` (T, 2) says in
+    which frames each foot stands. What counts is the joint's horizontal displacement per 1/60 s
+    between two frames in both of which its foot stands; the mean is over those and over the feet.
+    0 where no foot ever stands for two frames.
+    """
+    step = np.diff(recording.positions[:, joints][..., [0, 2]].astype(float), axis=0)
+    stands = planted[1:] & planted[:-1]
+    if not stands.any():
+        return 0.0
+    v = np.hypot(step[..., 0], step[..., 1]) * recording.fps / 60.0
+    return float(v[stands].mean() * 100.0)
 
 
 def jerk(positions: Array, fps: float) -> Array:

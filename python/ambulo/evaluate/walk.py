@@ -44,6 +44,8 @@ class LapFigures:
     foot_skate_cm_per_frame: float
     foot_skate_cm_per_s: float
     foot_floor_cm: float
+    planted_slide_cm_per_frame: float
+    planted_share: float
     ms_per_frame_mean: float
     ms_per_frame_sd: float
     held_frames: int
@@ -72,6 +74,7 @@ def walk_laps(
     laps: int,
     *,
     responsive: bool = False,
+    place_feet: bool = True,
     on_progress: Callable[[float], None] | None = None,
 ) -> Iterator[Lap]:
     """Walk a character around a track, lap after lap.
@@ -82,6 +85,7 @@ def walk_laps(
         terrain: what it walks on.
         laps: how many, ≥ 1.
         responsive: the controller's quicker tuning.
+        place_feet: by the layer, as `Controller` does.
         on_progress: called once a second of walking with the laps done so far, fractions included.
 
     Yields:
@@ -90,8 +94,9 @@ def walk_laps(
     origin, first = track.start, track.waypoints[0].position
     facing = math.atan2(first[0] - origin[0], first[1] - origin[1])
     character = Controller(
-        model, terrain=terrain, start=origin, facing=facing, responsive=responsive
-    )
+        model, terrain=terrain, start=origin, facing=facing,
+        responsive=responsive, place_feet=place_feet,
+    )  # fmt: skip
     for lap in range(laps):
         yield _Walker(character, track, terrain, lap, on_progress).lap()
 
@@ -113,6 +118,7 @@ class _Walker:
         self.tips: list[NDArray[np.float32]] = []
         self.rotations: list[NDArray[np.float32]] = []
         self.rows: list[tuple[float, ...]] = []
+        self.planted: list[list[bool]] = []
         self.seconds: list[float] = []
         self.reached = self.held = 0
 
@@ -153,6 +159,7 @@ class _Walker:
         self.positions.append(self.character.positions())
         self.tips.append(self.character.tips())
         self.rotations.append(self.character.rotations())
+        self.planted.append(self.character.planted)
         self.rows.append((x, z, yaw, *asked, leg, gait, *self.character.contacts))
 
     def _recording(self) -> Recording:
@@ -182,6 +189,7 @@ class _Walker:
         if floor is None:
             floor = np.array([feet["heights"][i] for i in (1, 3)])
         skate = metrics.foot_skate(recording, self.terrain, toes, floor)
+        planted = np.array(self.planted)
         ms = np.array(self.seconds) * 1000.0
         return LapFigures(
             time_s=len(recording.root) / FPS,
@@ -193,6 +201,8 @@ class _Walker:
             foot_skate_cm_per_frame=skate,
             foot_skate_cm_per_s=FPS * skate,
             foot_floor_cm=float(floor.mean() * 100.0),
+            planted_slide_cm_per_frame=metrics.planted_slide(recording, planted, toes),
+            planted_share=float(planted.mean()),
             ms_per_frame_mean=float(ms.mean()),
             ms_per_frame_sd=float(ms.std()),
             held_frames=self.held,

@@ -15,6 +15,7 @@ mod idle;
 mod intent;
 mod legs;
 mod model;
+mod stance;
 mod trajectory;
 mod tuning;
 

@@ -659,3 +659,16 @@ fn a_stander_sways_and_stays() {
     assert!(farthest > 0.02 && farthest < 0.12, "{farthest} m from its place");
     assert!(gone(Tuning::default(), Vec2::ZERO, 3) < 1e-6, "as published: frozen");
 }
+
+#[test]
+fn a_model_knows_how_it_stands() {
+    let stance = model().stance().unwrap();
+    let expected = self::stance();
+    assert!(stance[0].translation.abs_diff_eq(expected.joint_position[0], 0.02), "{:?}", stance[0]);
+    // The left toes are in contact 4 cm above the ground; the right ones never are, and are put at
+    // the height that the bundle says.
+    let toes = [4, 8].map(|toe| stance[toe].translation.y);
+    assert!((toes[0] - 0.04).abs() < 0.02 && (toes[1] - 0.04).abs() < 0.02, "{toes:?}");
+    let thighs = [1, 5].map(|thigh| stance[thigh].translation.x);
+    assert!(thighs[0] > 0.05 && thighs[1] < -0.05, "it faces +Z: {thighs:?}");
+}

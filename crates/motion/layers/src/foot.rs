@@ -1,22 +1,17 @@
 //! One foot over the ground: where its ankle goes, and how it and its toes are turned.
 
 use ambulo_rig::glam::{Quat, Vec3};
-use ambulo_rig::{Skeleton, Terrain, Transform};
+use ambulo_rig::{Skeleton, Terrain, Transform, share};
 
-use crate::foot_placement::{FootSettings, Ground};
+use crate::foot_hold::{FootState, Grip, Moment};
+use crate::foot_placement::FootSettings;
 use crate::smooth::{smoothstep, spring};
 use crate::two_bone::Limb;
-use ambulo_rig::share;
 
 /// How far ahead of a swinging foot the ground is looked at, at most, metres.
 const FARTHEST_AHEAD: f32 = 0.5;
 /// How far ahead of a foot that starts to swing it is looked at, metres.
 const LEAST_AHEAD: f32 = 0.15;
-/// A held foot that the motion has this far above or below is let go, metres.
-const LEASH_UP: f32 = 0.5;
-/// Half-life in seconds by which a held foot creeps to where the motion has it: nothing within a
-/// step (0.7 mm a frame at 60 Hz at most), but whoever stands ends in the motion's stance.
-const CREEP: f32 = 2.0;
 /// How far the heel is raised off its drawn place, and toes are bent down and up, radians; what is
 /// missing then, the whole foot is raised.
 const MOST_HEEL: [f32; 2] = [0.0, 0.8];
@@ -33,45 +28,15 @@ pub(crate) struct Foot {
     pub ankle: usize,
     pub toe: usize,
     /// Height of the ball, the joint that the toes turn about, above the ground.
-    ball: f32,
+    pub ball: f32,
+    /// The way that it points, in the ankle's frame.
+    pub forward: Vec3,
     /// From ankle to ball along the ground, metres.
     length: f32,
     /// Lowest point of the heel, in the ankle's frame.
     heel: Vec3,
     /// Lowest point at the tip of the toes, in the toes' frame.
     tip: Vec3,
-}
-
-/// Whether a foot is held, and where its ball is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-enum Grip {
-    #[default]
-    Free,
-    Held(Vec3),
-    /// Left behind while in contact: not held again before it has been off the ground.
-    Lost,
-}
-
-/// What a foot remembers.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct FootState {
-    grip: Grip,
-    /// From where the motion has the ball, raised with the ground, to where it is shown.
-    shift: Vec3,
-    /// Of the ground over the level, metres, and its speed.
-    lift: f32,
-    lift_speed: f32,
-    /// How steeply the ground under it rises towards +X and +Z, and its speed.
-    slope: Vec3,
-    slope_speed: Vec3,
-    /// Where the motion had the ball.
-    last: Option<Vec3>,
-}
-
-impl FootState {
-    pub fn is_held(&self) -> bool {
-        matches!(self.grip, Grip::Held(_))
-    }
 }
 
 /// Where a foot is to be, in the world.
@@ -105,6 +70,7 @@ impl Foot {
             ankle,
             toe,
             ball: (ball.translation.y - floor).max(0.0),
+            forward: at.rotation.inverse() * along.normalize_or_zero(),
             length: along.length(),
             heel: at.rotation.inverse() * (heel - at.translation),
             tip: ball.rotation.inverse() * (tip - ball.translation),
@@ -118,20 +84,26 @@ impl Foot {
         &self,
         state: &mut FootState,
         settings: &FootSettings,
-        contact: f32,
-        ground: &Ground<'_>,
-        dt: f32,
+        moment: &Moment<'_>,
         global: &[Transform],
     ) -> Option<Plan> {
+        let &Moment { ground, contact, dt, .. } = moment;
         let (ankle, toe) = (global[self.ankle], global[self.toe]);
         let ball = toe.translation;
-        let along = (ball - ankle.translation).with_y(0.0).normalize_or_zero();
+        let drawn = (ball - ankle.translation).with_y(0.0).normalize_or_zero();
+        let heading = self.heading(ankle.rotation);
+        self.turn(state, settings, heading, dt);
+        let along = turned(state.turn, drawn);
         let first = state.last.is_none();
         let slope = self.slope(settings, ground.terrain, ball + state.shift, along)?;
         let lift = match (ground.level, state.grip) {
             (None, _) => 0.0,
             (Some(level), Grip::Held(place)) => {
                 self.support(state, ground.terrain, place, along)? - level
+            }
+            // Where it is going to land.
+            (Some(level), Grip::Stepping(_)) => {
+                self.support(state, ground.terrain, ball, along)? - level
             }
             (Some(level), _) => {
                 self.soon(state, settings, ground.terrain, ball, along, dt)? - level
@@ -144,54 +116,26 @@ impl Foot {
         let half = settings.ground;
         (state.lift, state.lift_speed) = spring(state.lift, state.lift_speed, lift, half, dt);
         (state.slope, state.slope_speed) = spring(state.slope, state.slope_speed, slope, half, dt);
-        let shown = self.hold(state, settings, ground.terrain, [ball, along], contact, dt)?;
+        let shown = self.hold(state, settings, moment, [ball, along], heading)?;
+        state.heading = heading.map_or(state.heading, |heading| heading + state.turn);
         // A motion that follows the terrain has laid the foot on it itself.
         let up = if ground.level.is_some() { Vec3::Y - state.slope } else { Vec3::Y };
         let tilt = Quat::from_rotation_arc(Vec3::Y, up.normalize());
         let arm = ankle.rotation.inverse() * (ankle.translation - ball);
-        let planted = smoothstep(settings.hold, 1.0, contact);
-        let drawn = [tilt * ankle.rotation, tilt * toe.rotation];
-        self.set_down(ground.terrain, shown, arm, drawn, planted)
-    }
-
-    /// Where the ball is shown: held, on its way back to the motion, or there; never underground.
-    fn hold(
-        &self,
-        state: &mut FootState,
-        settings: &FootSettings,
-        terrain: &dyn Terrain,
-        [ball, along]: [Vec3; 2],
-        contact: f32,
-        dt: f32,
-    ) -> Option<Vec3> {
-        let drawn = ball + Vec3::Y * state.lift;
-        state.shift -= state.shift * share(settings.release, dt);
-        let far = |place: Vec3| {
-            let away = drawn - place;
-            away.with_y(0.0).length() >= settings.leash || away.y.abs() >= LEASH_UP
-        };
-        state.grip = match state.grip {
-            _ if contact < settings.let_go => Grip::Free,
-            // Taking hold where the foot is shown, not where the motion has it, leaves no jump.
-            Grip::Free if contact >= settings.hold => Grip::Held(drawn + state.shift),
-            Grip::Held(place) if far(place) => Grip::Lost,
-            Grip::Held(place) => Grip::Held(place + (drawn - place).with_y(0.0) * share(CREEP, dt)),
-            grip => grip,
-        };
-        if let Grip::Held(mut place) = state.grip {
-            let floor = self.support(state, terrain, place, along)? + self.ball;
-            place.y = floor + (place.y - floor).max(0.0) * (1.0 - share(settings.landing, dt));
-            state.shift = place - drawn;
-            state.grip = Grip::Held(place);
-        }
-        let shown = drawn + state.shift;
-        Some(shown.with_y(shown.y.max(height(terrain, shown)? + self.ball)))
+        let planted = smoothstep(settings.hold, 1.0, contact) * (1.0 - state.airborne);
+        let yaw = Quat::from_rotation_y(state.turn);
+        let drawn = [ankle, toe].map(|joint| {
+            tilt * if state.turn == 0.0 { joint.rotation } else { yaw * joint.rotation }
+        });
+        // A foot that was never seen has nothing to come from.
+        let settled = if first { 1.0 } else { share(settings.landing, dt) };
+        self.set_down(ground.terrain, shown, arm, drawn, [planted, settled], &mut state.bend)
     }
 
     /// Height under the ball of the ground that a flat foot at `ball` rests on: the plane of its
     /// slope, raised until neither heel nor toes stick in the ground. On an edge that is the upper
     /// step, over which the rest of the foot hangs.
-    fn support(
+    pub fn support(
         &self,
         state: &FootState,
         terrain: &dyn Terrain,
@@ -236,17 +180,21 @@ impl Foot {
 
     /// Turns a foot and its toes, whose ball is at `shown` and which are `drawn` like that, about
     /// the ball until heel and tip are not underground, as far as they bend; the rest, the whole
-    /// foot is raised. The more a foot is `planted`, the more its toes lie on the ground.
+    /// foot is raised. The more a foot is `planted`, the more its toes bend down to lie on the ground;
+    /// `settled` is the share of the way there, since a network is sure of a foot from one frame to
+    /// the next.
     fn set_down(
         &self,
         terrain: &dyn Terrain,
         mut shown: Vec3,
         arm: Vec3,
         drawn: [Quat; 2],
-        planted: f32,
+        [planted, settled]: [f32; 2],
+        bend: &mut f32,
     ) -> Option<Plan> {
         let [mut rotation, mut toes] = drawn;
         let (flat_heel, flat_tip) = (rotation * (arm + self.heel), toes * self.tip);
+        let before = *bend;
         // Twice, for where a turned foot ends the ground may be another.
         for _ in 0..2 {
             let floor = height(terrain, shown + rotation * (arm + self.heel))? - shown.y;
@@ -254,8 +202,12 @@ impl Foot {
             let floor = height(terrain, shown + toes * self.tip)? - shown.y;
             let below = floor - flat_tip.y;
             // Over an edge toes stay as they are.
-            let down = below * planted * (1.0 - smoothstep(NEAR, 2.0 * NEAR, -below));
-            toes = raise(flat_tip, flat_tip.y + below.max(down), MOST_TOES) * drawn[1];
+            let down = planted * (1.0 - smoothstep(NEAR, 2.0 * NEAR, -below));
+            let to_ground = elevation(flat_tip, floor).clamp(-MOST_TOES[0], MOST_TOES[1]);
+            let wanted = before + ((-to_ground * down).max(0.0) - before) * settled;
+            let wanted = wanted.min((-to_ground).max(0.0));
+            *bend = wanted;
+            toes = lifted(flat_tip, to_ground.max(-wanted)) * drawn[1];
         }
         // On an edge it is the middle of the sole that is in the way.
         let [heel, ball] = [rotation * (arm + self.heel), Vec3::NEG_Y * self.ball];
@@ -286,17 +238,33 @@ impl Foot {
     }
 }
 
-fn height(terrain: &dyn Terrain, place: Vec3) -> Option<f32> {
+/// A direction turned about the vertical; exactly itself where the angle is 0.
+fn turned(angle: f32, direction: Vec3) -> Vec3 {
+    if angle == 0.0 { direction } else { Quat::from_rotation_y(angle) * direction }
+}
+
+pub(crate) fn height(terrain: &dyn Terrain, place: Vec3) -> Option<f32> {
     let height = terrain.height(place.x, place.z);
     height.is_finite().then_some(height)
 }
 
-/// The turn about a level axis that brings the end of `arm` to the height `to`, or as near as the
-/// angles down and up allow.
-fn raise(arm: Vec3, to: f32, [down, up]: [f32; 2]) -> Quat {
-    let Some(axis) = arm.cross(Vec3::Y).try_normalize() else { return Quat::IDENTITY };
+/// By how much the end of `arm` must go up, as seen from its start, to come to the height `to`,
+/// radians.
+fn elevation(arm: Vec3, to: f32) -> f32 {
     let elevation = |y: f32| (y / arm.length()).clamp(-1.0, 1.0).asin();
-    Quat::from_axis_angle(axis, (elevation(to) - elevation(arm.y)).clamp(-down, up))
+    if arm.length() > 0.0 { elevation(to) - elevation(arm.y) } else { 0.0 }
+}
+
+/// The turn about a level axis that lifts the end of `arm` by an angle.
+fn lifted(arm: Vec3, angle: f32) -> Quat {
+    let axis = arm.cross(Vec3::Y).try_normalize();
+    axis.map_or(Quat::IDENTITY, |axis| Quat::from_axis_angle(axis, angle))
+}
+
+/// The turn that brings the end of `arm` to the height `to`, or as near as the angles down and up
+/// allow.
+fn raise(arm: Vec3, to: f32, [down, up]: [f32; 2]) -> Quat {
+    lifted(arm, elevation(arm, to).clamp(-down, up))
 }
 
 #[cfg(test)]

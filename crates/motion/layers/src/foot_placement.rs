@@ -9,7 +9,9 @@ use ambulo_rig::glam::Vec3;
 use ambulo_rig::{Pose, Roles, Skeleton, Terrain, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::foot::{Foot, FootState, Plan};
+use crate::foot::{Foot, Plan};
+use crate::foot_hold::{FootState, Moment};
+use crate::foot_step::StepSettings;
 use crate::hips::{Hips, HipsError, HipsSettings, HipsState, Want};
 use crate::smooth::smoothstep;
 use crate::two_bone::{Limb, LimbError, LimbSettings, Reach};
@@ -39,6 +41,9 @@ pub struct FootSettings {
     /// Steepest slope that a foot is laid on, radians; what is steeper is an edge, on which it stays
     /// level.
     pub steepest: f32,
+    /// Little steps of feet that stand to where the motion has them; without (the default) they only
+    /// creep there. With them a held foot keeps its heading, too, not only its place.
+    pub steps: Option<StepSettings>,
     /// Of the legs. Their softness is kept small, since what it takes off is missing at the foot.
     pub legs: LimbSettings,
     /// Of the hips.
@@ -56,6 +61,7 @@ impl Default for FootSettings {
             ground: 0.06,
             ahead: 0.15,
             steepest: 0.7,
+            steps: None,
             legs: LimbSettings { softness: 0.01, ..LimbSettings::LEG },
             hips: HipsSettings::default(),
         }
@@ -80,7 +86,8 @@ pub enum FootError {
     Stance,
 }
 
-/// What a character's feet remember; the default is a foot in the air.
+/// What a character's feet remember; the default is a foot in the air. Layers with other settings may
+/// take it over at any frame, also in the middle of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeetState {
     feet: [FootState; 2],
@@ -88,7 +95,7 @@ pub struct FeetState {
 }
 
 impl FeetState {
-    /// Whether the left and the right foot are held.
+    /// Whether the left and the right foot are held; a foot that takes a step of its own is not.
     pub fn held(&self) -> [bool; 2] {
         self.feet.map(|foot| foot.is_held())
     }
@@ -185,9 +192,11 @@ impl FootPlacement {
             return false;
         }
         let mut next = *state;
+        let lifted = self.lifted(&next.feet, contacts, global);
         let mut planned = |side: usize| {
-            let (foot, settings) = (&self.feet[side], &self.settings);
-            foot.plan(&mut next.feet[side], settings, contacts[2 * side + 1], ground, dt, global)
+            let (contact, may_step) = (contacts[2 * side + 1], lifted == Some(side));
+            let moment = Moment { ground: *ground, contact, may_step, dt };
+            self.feet[side].plan(&mut next.feet[side], &self.settings, &moment, global)
         };
         let (Some(left), Some(right)) = (planned(0), planned(1)) else { return false };
         let plans = [left, right];
@@ -200,10 +209,25 @@ impl FootPlacement {
             let asked = Reach { rotation, ..Reach::at(plan.ankle) };
             foot.leg.reach(skeleton, &asked, pose, global);
             pose.turn_to(skeleton, foot.toe, plan.toes, global);
-            pose.update_global(skeleton, foot.toe + 1, global);
+            pose.update_range(skeleton, foot.toe + 1..foot.leg.behind(), global);
         }
         *state = next;
         true
+    }
+
+    /// Which foot is to be lifted for a little step: the one that is farther off, and only while both
+    /// are held and stay in contact.
+    fn lifted(
+        &self,
+        feet: &[FootState; 2],
+        contacts: [f32; 4],
+        global: &[Transform],
+    ) -> Option<usize> {
+        let steps = self.settings.steps?;
+        let stays = contacts[1].min(contacts[3]) >= self.settings.let_go;
+        let off = |side: usize| self.feet[side].off(&feet[side], &steps, global);
+        let (left, right) = (off(0)?, off(1)?);
+        (stays && left.max(right) >= 1.0).then_some(usize::from(right > left))
     }
 
     /// What a leg wants of the hips, the more the surer its foot is on the ground.
@@ -236,6 +260,7 @@ impl FootSettings {
         let bad = bad.map(|(name, _)| *name);
         let order = (self.let_go > self.hold || self.hold > 1.0).then_some("order of contacts");
         let steep = (self.steepest > 1.2).then_some("steepest");
-        bad.or(order).or(steep).map_or(Ok(()), |name| Err(FootError::Setting(name)))
+        let steps = self.steps.and_then(|steps| steps.bad());
+        bad.or(order).or(steep).or(steps).map_or(Ok(()), |name| Err(FootError::Setting(name)))
     }
 }

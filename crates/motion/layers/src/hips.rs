@@ -1,22 +1,17 @@
 //! Hips moved by the least that lets hands and feet reach what they are to reach.
 //!
 //! Each limb allows the hips a ball: those places from which its first joint is near enough to its
-//! target. The place in all balls that is nearest to the motion's own is found by Dykstra's
-//! projections (Boyle, Dykstra, 1986), which go from ball to ball like the plain ones but end in the
-//! nearest point, not in any. Where no place is in all of them it lies in between.
+//! target. They go to the place in all balls that is nearest to the motion's own.
 
 use ambulo_rig::glam::Vec3;
 use ambulo_rig::{Pose, Roles, Skeleton, Transform};
 use serde::{Deserialize, Serialize};
 
+use crate::balls::{Ball, nearest};
 use crate::smooth::spring;
 
 /// Most limbs that one call looks at.
 pub const MOST_LIMBS: usize = 8;
-
-/// Rounds of Dykstra's projections, and of plain ones after them, which come closer to being in all
-/// balls: together within 2 mm of both in thousands of trials with four of them.
-const ROUNDS: [usize; 2] = [100, 50];
 
 /// How hips follow.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,8 +72,6 @@ pub struct HipsState {
     pub velocity: Vec3,
 }
 
-/// A ball of places.
-type Ball = (Vec3, f32);
 const NONE: Ball = (Vec3::ZERO, 0.0);
 
 impl Hips {
@@ -170,63 +163,5 @@ impl Want {
         let lengths = self.comfort >= 0.0 && self.comfort.is_finite() && self.reach.is_finite();
         let near = (self.target - self.root).length_squared().is_finite();
         near && lengths && self.weight.is_finite()
-    }
-}
-
-/// The point in all balls that is nearest to `from`.
-fn nearest(from: Vec3, balls: &[Ball]) -> Vec3 {
-    let inside = |&(centre, radius): &Ball| from.distance(centre) <= radius;
-    if balls.iter().all(inside) {
-        return from;
-    }
-    let mut corrections = [Vec3::ZERO; MOST_LIMBS];
-    let (mut point, mut mean) = (from, from);
-    let [exact, plain] = ROUNDS;
-    for round in 0..exact + plain {
-        mean = Vec3::ZERO;
-        for (&(centre, radius), correction) in balls.iter().zip(&mut corrections) {
-            let kept = if round < exact { *correction } else { Vec3::ZERO };
-            let asked = point + kept;
-            point = centre + (asked - centre).clamp_length_max(radius);
-            *correction = asked - point;
-            mean += point;
-        }
-        mean /= balls.len() as f32;
-    }
-    mean
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    #[test]
-    fn between_wants_that_exclude_each_other_they_stay_in_the_middle() {
-        let ball = |x: f32| (Vec3::new(x, 0.0, 0.0), 0.5);
-        let middle = nearest(Vec3::new(0.0, 0.1, 0.0), &[ball(-1.0), ball(1.0)]);
-        assert!(middle.x.abs() < 0.01, "{middle}");
-    }
-
-    proptest! {
-        /// The nearest point of a convex set is the one from which the way back to where one came
-        /// from leads away from all others of the set.
-        #[test]
-        fn no_place_in_all_balls_is_nearer(
-            centres in prop::collection::vec(prop::array::uniform3(-0.5..0.5f32), 1..5),
-            from in prop::array::uniform3(-1.5..1.5f32),
-            others in prop::collection::vec(prop::array::uniform3(-0.6..0.6f32), 64),
-        ) {
-            // All of them hold the origin with some room.
-            let centres: Vec<_> = centres.into_iter().map(Vec3::from_array).collect();
-            let balls: Vec<_> = centres.iter().map(|&c| (c, c.length() + 0.1)).collect();
-            let from = Vec3::from_array(from);
-            let found = nearest(from, &balls);
-            let excess = |p: Vec3| balls.iter().map(|(c, r)| p.distance(*c) - r).fold(-1.0, f32::max);
-            prop_assert!(excess(found) < 2e-3, "{}", excess(found));
-            for other in others.into_iter().map(Vec3::from_array).filter(|&p| excess(p) <= 0.0) {
-                prop_assert!(other.distance(from) > found.distance(from) - 2e-3);
-            }
-        }
     }
 }

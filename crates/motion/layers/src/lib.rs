@@ -6,12 +6,15 @@
 //! transforms as in [`ambulo_rig::Pose`]. Where something decays it is told by its half-life, so that
 //! nothing depends on the frame rate.
 
+mod balls;
 mod blend;
 mod blend_space;
 mod blend_tree;
 mod chain;
 mod foot;
+mod foot_hold;
 mod foot_placement;
+mod foot_step;
 mod hips;
 mod inertialise;
 mod joint_limit;
@@ -31,6 +34,7 @@ pub use blend_space::{BlendSpace1, BlendSpace2, SpaceError};
 pub use blend_tree::{Amount, BlendTree, Node, Sample, TreeError, TreeProblem};
 pub use chain::{Chain, ChainError, ChainScratch, ChainSettings};
 pub use foot_placement::{FeetState, FootError, FootPlacement, FootSettings, Ground};
+pub use foot_step::StepSettings;
 pub use hips::{Hips, HipsError, HipsSettings, HipsState, MOST_LIMBS, Want};
 pub use inertialise::{Decay, Inertialiser};
 pub use joint_limit::JointLimit;

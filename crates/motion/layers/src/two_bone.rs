@@ -107,6 +107,8 @@ impl Span {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limb {
     joints: [usize; 3],
+    /// Behind the last joint that hangs on the first one.
+    behind: usize,
     /// What it bends about when straight, in the frame of the middle joint.
     hinge: Vec3,
     /// Whether that is measured, not supposed.
@@ -155,7 +157,17 @@ impl Limb {
         let drawn = bend_axis([a, b, c]);
         let supposed = || (c - a).cross(settings.points).normalize_or(Vec3::NEG_X);
         let hinge = bent[lower].rotation.inverse() * drawn.unwrap_or_else(supposed);
-        Ok(Self { joints: [upper, lower, end], hinge, sure: drawn.is_some(), settings })
+        let mut hangs = vec![false; skeleton.len()];
+        for (index, joint) in skeleton.joints().iter().enumerate() {
+            hangs[index] = index == upper || joint.parent.is_some_and(|parent| hangs[parent]);
+        }
+        let behind = hangs.iter().rposition(|&hangs| hangs).unwrap_or(upper) + 1;
+        Ok(Self { joints: [upper, lower, end], behind, hinge, sure: drawn.is_some(), settings })
+    }
+
+    /// Behind the last joint that hangs on the limb.
+    pub(crate) fn behind(&self) -> usize {
+        self.behind
     }
 
     /// First, middle and end joint.
@@ -204,7 +216,7 @@ impl Limb {
         pose.turn_to(skeleton, upper, first, global);
         pose.turn_to(skeleton, lower, second, global);
         pose.turn_to(skeleton, end, rotation, global);
-        pose.update_global(skeleton, upper + 1, global);
+        pose.update_range(skeleton, upper + 1..self.behind, global);
         true
     }
 

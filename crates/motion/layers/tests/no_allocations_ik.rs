@@ -9,7 +9,8 @@ use std::cell::Cell;
 
 use ambulo_layers::{
     Chain, ChainSettings, FeetState, FootPlacement, FootSettings, Ground, Hips, HipsSettings,
-    HipsState, JointLimit, Limb, LimbSettings, LookAt, LookJoint, LookSettings, Pole, Reach, Want,
+    HipsState, JointLimit, Limb, LimbSettings, LookAt, LookJoint, LookSettings, Pole, Reach,
+    StepSettings, Want,
 };
 use ambulo_rig::HeightField;
 use ambulo_rig::glam::Vec3;
@@ -56,8 +57,10 @@ fn nothing_is_allocated_while_a_character_moves() {
     let (skeleton, stance) = (&walker.skeleton, walker.stance());
     let (mut pose, mut global) = walker.buffers();
     let terrain = HeightField::hills(3, 40.0, 4.0).unwrap();
-    let feet =
-        FootPlacement::new(skeleton, &walker.roles, &stance, 0.0, FootSettings::default()).unwrap();
+    let feet = [None, Some(StepSettings::default())].map(|steps| {
+        let settings = FootSettings { steps, ..FootSettings::default() };
+        FootPlacement::new(skeleton, &walker.roles, &stance, 0.0, settings).unwrap()
+    });
     let limb = Limb::new(skeleton, ANKLES[0], &stance, LimbSettings::LEG).unwrap();
     let limits = [JointLimit { cone: 0.4, twist: 0.1 }; 2];
     let chain =
@@ -81,7 +84,15 @@ fn nothing_is_allocated_while_a_character_moves() {
         let asked = Reach { pole: Some(Pole::Point(target)), weight: 0.5, ..Reach::at(target) };
         let done = [
             hips.step(skeleton, &mut hips_state, &wants, dt, &mut pose, &mut global),
-            feet.step(skeleton, &mut feet_state, contacts, &ground, dt, &mut pose, &mut global),
+            feet[frame / 50 % 2].step(
+                skeleton,
+                &mut feet_state,
+                contacts,
+                &ground,
+                dt,
+                &mut pose,
+                &mut global,
+            ),
             chain.solve(skeleton, &mut scratch, target, 0.5, &mut pose, &mut global),
             look.step(skeleton, &mut looks, Some(target), 1.0, dt, &mut pose, &mut global),
             limb.reach(skeleton, &asked, &mut pose, &mut global),

@@ -4,6 +4,7 @@ mod chain;
 mod hips;
 mod look_at;
 mod standing;
+mod stepping;
 mod two_bone;
 mod walk;
 mod walking;

@@ -172,3 +172,35 @@ proptest! {
         }
     }
 }
+
+/// Joints of both arms in turn: what hangs on one is not all in a row.
+#[test]
+fn whatever_hangs_on_an_arm_is_kept_up_to_date() {
+    let joint = |name: &str, parent, offset: [f64; 3]| Joint {
+        name: name.into(),
+        parent,
+        offset: offset.into(),
+        tips: vec![],
+    };
+    let mut joints = vec![joint("chest", None, [0.0, 1.3, 0.0])];
+    for (name, length) in [("arm", 0.15), ("forearm", 0.3), ("hand", 0.25), ("finger", 0.1)] {
+        for (side, x) in [("left", 1.0), ("right", -1.0)] {
+            let parent = joints.len().saturating_sub(2);
+            joints.push(joint(&format!("{side}{name}"), Some(parent), [x * length, 0.0, 0.0]));
+        }
+    }
+    joints[2].parent = Some(0);
+    let skeleton = Skeleton::new(joints).unwrap();
+    let mut pose = skeleton.rest_pose();
+    let mut global = vec![Transform::IDENTITY; skeleton.len()];
+    pose.to_global(&skeleton, &mut global);
+    let limb = Limb::new(&skeleton, 5, &global, LimbSettings::ARM).unwrap();
+    let asked = Reach::at(Vec3::new(0.3, 1.1, 0.3));
+    assert!(limb.reach(&skeleton, &asked, &mut pose, &mut global));
+    let mut again = global.clone();
+    pose.to_global(&skeleton, &mut again);
+    assert!(global[7].translation.distance(Vec3::new(0.7, 1.3, 0.0)) > 0.1, "the finger moves");
+    for (now, again) in global.iter().zip(&again) {
+        assert!(now.translation.distance(again.translation) < 1e-5);
+    }
+}
