@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::foot::{Foot, Plan};
 use crate::foot_hold::{FootState, Moment};
 use crate::foot_step::StepSettings;
-use crate::hips::{Hips, HipsError, HipsSettings, HipsState, Want};
+use crate::hips::{Hips, HipsError, HipsSettings, HipsState, MOST_LIMBS, Want};
 use crate::smooth::smoothstep;
 use crate::two_bone::{Limb, LimbError, LimbSettings, Reach};
 
@@ -182,6 +182,25 @@ impl FootPlacement {
         pose: &mut Pose,
         global: &mut [Transform],
     ) -> bool {
+        self.step_reaching(skeleton, state, contacts, ground, &[], dt, pose, global)
+    }
+
+    /// The same with hips that also heed what others want of them: hands that are to reach something.
+    ///
+    /// # Panics
+    /// On more than [`MOST_LIMBS`] − 2 others.
+    #[allow(clippy::too_many_arguments)] // The caller's buffers, and what is asked.
+    pub fn step_reaching(
+        &self,
+        skeleton: &Skeleton,
+        state: &mut FeetState,
+        contacts: [f32; 4],
+        ground: &Ground<'_>,
+        others: &[Want],
+        dt: f32,
+        pose: &mut Pose,
+        global: &mut [Transform],
+    ) -> bool {
         let joints =
             |foot: &Foot| [foot.leg.joints()[0], foot.leg.joints()[1], foot.ankle, foot.toe];
         let sound = |joint: usize| global[joint].is_finite() && pose.local[joint].is_finite();
@@ -200,8 +219,13 @@ impl FootPlacement {
         };
         let (Some(left), Some(right)) = (planned(0), planned(1)) else { return false };
         let plans = [left, right];
-        let wants = [0, 1].map(|side| self.want(side, &plans[side], contacts, global));
-        if !self.hips.step(skeleton, &mut next.hips, &wants, dt, pose, global) {
+        let mut wants = [Want::default(); MOST_LIMBS];
+        for (side, plan) in plans.iter().enumerate() {
+            wants[side] = self.want(side, plan, contacts, global);
+        }
+        wants[2..2 + others.len()].copy_from_slice(others);
+        let wants = &wants[..2 + others.len()];
+        if !self.hips.step(skeleton, &mut next.hips, wants, dt, pose, global) {
             return false;
         }
         for (foot, plan) in self.feet.iter().zip(plans) {

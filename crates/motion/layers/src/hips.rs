@@ -42,7 +42,7 @@ pub enum HipsError {
 }
 
 /// What one limb needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Want {
     /// Where the limb's first joint is in the motion's own pose, in the world.
     pub root: Vec3,

@@ -28,7 +28,7 @@ use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Pose, Transform};
 
 use crate::approach::{Going, Walk, Why};
-use crate::interaction::{Limb, Walks};
+use crate::interaction::{Action, Limb, Walks};
 use crate::surroundings::Surroundings;
 
 use acting::Acting;
@@ -39,6 +39,14 @@ pub use moves::{Move, MoveError, Moves};
 /// Metres that are kept from walls and objects, and at most from what is used.
 const KEEP: f32 = 0.35;
 const USED: f32 = 0.22;
+/// Nearer than the first to what was used it only steps back, at so many metres a second; beyond the
+/// second it goes where it wants. Metres.
+const ROOM: [f32; 2] = [0.2, 0.32];
+const BACK: f32 = 0.7;
+/// Metres over which distances are compared.
+const STEP: f32 = 0.01;
+/// Share of the angle to which a hinge is to be led up to which it counts as not led yet.
+const AT_REST: f32 = 0.1;
 /// Who is to stand does when slower than this, metres a second; waited for so long, seconds.
 const SETTLED: (f32, f32) = (0.15, 1.5);
 /// Metres around the character in which there are walls.
@@ -167,6 +175,8 @@ pub struct Actor {
     holds: Option<usize>,
     /// How quickly the clip goes on: it waits for who does not reach.
     pace: f32,
+    /// A hand slipped off what it held.
+    slips: bool,
     /// How far the clip went in this frame, seconds.
     tick: f32,
     /// What it uses or has just used, and how near it may come to that, metres.
@@ -219,6 +229,7 @@ impl Actor {
             jumped: false,
             holds: None,
             pace: 1.0,
+            slips: false,
             tick: 0.0,
             near: None,
             velocity: Vec2::ZERO,
@@ -313,10 +324,19 @@ impl Actor {
     ) -> impl Iterator<Item = (usize, usize)> + 'a {
         let feet = self.controller.root().position;
         self.moves.offers().iter().copied().filter(move |&(object, which)| {
-            let trigger = &self.moves.all()[which].interaction.trigger;
-            around
-                .frame(object, &trigger.on)
-                .is_some_and(|frame| trigger.volume.contains(frame.inverse().transform_point(feet)))
+            let interaction = &self.moves.all()[which].interaction;
+            let trigger = &interaction.trigger;
+            let within = around.frame(object, &trigger.on).is_some_and(|frame| {
+                trigger.volume.contains(frame.inverse().transform_point(feet))
+            });
+            // A door that is open, or still on its way, is not opened.
+            let rests = match interaction.action {
+                Some(Action::Hinge { angle, .. }) => {
+                    around.turned(object).abs() < AT_REST * angle.abs()
+                }
+                _ => true,
+            };
+            within && rests
         })
     }
 
@@ -336,7 +356,11 @@ impl Actor {
     /// What to ask of the controller.
     fn decide(&mut self, dt: f32, wish: &Wish, around: &mut dyn Surroundings) -> Intent {
         match (self.stage, wish.act) {
-            (Stage::Free, Some(Act::Begin { object, which })) => self.begin(object, which, around),
+            (Stage::Free, Some(Act::Begin { object, which }))
+                if self.begin(object, which, around) =>
+            {
+                return standing(ahead(self.controller.root().yaw));
+            }
             (Stage::Walking { .. }, Some(Act::Leave | Act::Interrupt)) => {
                 self.stage = Stage::Free;
                 self.told = Some(Told::Broken);
@@ -364,8 +388,30 @@ impl Actor {
         }
         match self.stage {
             Stage::Acting(_) => self.go_on(dt, wish, around),
-            _ => wish.intent,
+            _ => self.around_what_was_used(wish.intent, around),
         }
+    }
+
+    /// Who stands close to what was used and wants to go steps back from it before it turns: feet
+    /// that swing reach half a metre.
+    fn around_what_was_used(&self, intent: Intent, around: &dyn Surroundings) -> Intent {
+        let Some((object, room)) = self.near.filter(|_| intent.velocity.length() > SETTLED.0)
+        else {
+            return intent;
+        };
+        let root = self.controller.root();
+        let place = level(root.position);
+        let [here, x, z] = [Vec2::ZERO, Vec2::X * STEP, Vec2::Y * STEP]
+            .map(|off| around.distance(object, place + off));
+        let out = Vec2::new(x - here, z - here).normalize_or_zero();
+        let close = ((ROOM[1] - room) / (ROOM[1] - ROOM[0])).clamp(0.0, 1.0);
+        let along = intent.velocity - out * intent.velocity.dot(out).min(0.0);
+        let velocity = along.lerp(out * BACK, close);
+        if close == 0.0 {
+            return Intent { velocity, ..intent };
+        }
+        let (facing, strafe) = (Some(ahead(root.yaw)), intent.strafe.max(close));
+        Intent { velocity, facing, strafe, ..intent }
     }
 
     /// Whether it must come to rest before a clip that stands.
@@ -375,19 +421,20 @@ impl Actor {
         stands && !rests && there < SETTLED.1
     }
 
-    fn begin(&mut self, object: usize, which: usize, around: &dyn Surroundings) {
-        if !self.offers(around).any(|offer| offer == (object, which)) {
-            return;
-        }
+    /// Whether it is on offer, and it walks there from the next step on.
+    fn begin(&mut self, object: usize, which: usize, around: &dyn Surroundings) -> bool {
         let approach = &self.moves.all()[which].interaction.approach;
-        if let Some(frame) = around.frame(object, &approach.on) {
-            let stand = approach.stand(frame);
-            let walk = Walk::new(approach, stand);
-            let room = (around.distance(object, stand.0) - SPARE).clamp(LEAST, USED);
-            self.near = Some((object, room));
-            self.stage = Stage::Walking { object, which, walk, there: 0.0 };
-            self.told = Some(Told::Walks);
-        }
+        let offered = self.offers(around).any(|offer| offer == (object, which));
+        let Some(frame) = around.frame(object, &approach.on).filter(|_| offered) else {
+            return false;
+        };
+        let stand = approach.stand(frame);
+        let walk = Walk::new(approach, stand);
+        let room = (around.distance(object, stand.0) - SPARE).clamp(LEAST, USED);
+        self.near = Some((object, room));
+        self.stage = Stage::Walking { object, which, walk, there: 0.0 };
+        self.told = Some(Told::Walks);
+        true
     }
 }
 

@@ -158,6 +158,9 @@ pub struct Lever {
     /// What slows it, N·m·s/rad, 0.01 to 1000.
     #[serde(default = "lever_damping")]
     pub damping: f32,
+    /// What brings it back upright when nobody holds it, N·m/rad, 0 to 1000; 0: it stays as it is.
+    #[serde(default)]
+    pub closer: f32,
 }
 
 fn door_thickness() -> f32 {

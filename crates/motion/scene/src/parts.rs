@@ -264,10 +264,10 @@ impl Lever {
     const MASS: f32 = 2.0;
 
     fn parts(&self) -> Vec<Part> {
-        let &Lever { height, length, limits, damping } = self;
+        let &Lever { height, length, limits, damping, closer } = self;
         let post = solid([0.0, height * 0.5, 0.0], [0.1, height, 0.1]);
         let arm = solid([0.0, length * 0.5, 0.0], [0.03, length, 0.03]);
-        let (axis, closer, mass) = (Vec3::X, 0.0, Self::MASS);
+        let (axis, mass) = (Vec3::X, Self::MASS);
         let motion = Motion::Hinge { axis, limits, damping, closer, mass };
         vec![
             part("post", Vec3::ZERO, vec![post], Motion::Fixed),
@@ -339,7 +339,8 @@ mod tests {
     #[test]
     fn every_frame_that_is_named_is_there() {
         let button = Button { height: 1.1, radius: 0.05, travel: 0.02, stiffness: 400.0 };
-        let lever = Lever { height: 0.9, length: 0.4, limits: [-0.7, 0.7], damping: 2.0 };
+        let (limits, damping, closer) = ([-0.7, 0.7], 2.0, 0.0);
+        let lever = Lever { height: 0.9, length: 0.4, limits, damping, closer };
         let chair = Chair { seat_height: 0.45, seat_depth: 0.4, width: 0.4, back_height: 0.0 };
         let shape = MovableBox { size: [0.5; 3], mass: 10.0, friction: 0.5 };
         let kinds = [

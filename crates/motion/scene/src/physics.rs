@@ -86,11 +86,18 @@ pub struct Physics {
     world: PhysicsWorld,
     ground: GroundPieces,
     things: Vec<Thing>,
-    /// From where to where, and half their thickness.
-    walls: Vec<(Vec2, Vec2, f32)>,
+    walls: Vec<Upright>,
     person: Option<person::Person>,
     /// Seconds since the last fixed step, in [0, STEP).
     since: f64,
+}
+
+/// A wall: from where to where, half its thickness, how high its top is; metres.
+struct Upright {
+    start: Vec2,
+    end: Vec2,
+    half: f32,
+    top: f32,
 }
 
 /// An object.

@@ -161,4 +161,5 @@ fn check_lever(lever: &Lever, path: &str, found: &mut Found) {
     found.number(format!("{path}.length"), lever.length, 0.1, 2.0, " m");
     found.limits(&format!("{path}.limits"), lever.limits, -2.8, 2.8, " rad");
     found.number(format!("{path}.damping"), lever.damping, 0.01, 1000.0, " N·m·s/rad");
+    found.number(format!("{path}.closer"), lever.closer, 0.0, 1000.0, " N·m/rad");
 }

@@ -58,6 +58,13 @@ pub trait Surroundings {
     /// a large number of one that is not.
     fn distance(&self, object: usize, place: Vec2) -> f32;
 
+    /// The shortest way out of what is solid for a point in it, metres; none for one that is free. The
+    /// ground does not count, nor does the object `but`.
+    fn way_out(&self, point: Vec3, but: Option<usize>) -> Option<Vec3>;
+
+    /// How far the hinge of an object is turned, radians; 0 of one without.
+    fn turned(&self, object: usize) -> f32;
+
     /// Where a named frame of an object is now, in the world.
     fn frame(&self, object: usize, name: &str) -> Option<Transform>;
 

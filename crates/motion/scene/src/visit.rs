@@ -97,7 +97,7 @@ impl Visit {
         self.physics.step(STEP).expect("a good step");
         self.actor.pose(STEP, &mut self.physics);
         self.frames += 1;
-        self.measure.frame(&self.actor, &self.physics, &self.scene, acted.told);
+        self.measure.frame(&self.actor, &self.physics, acted.told);
         if let Some(told) = acted.told {
             self.tell(told);
         }

@@ -353,3 +353,21 @@ fn what_is_not_a_number_is_refused() {
     let step = physics.step(100.0).unwrap();
     assert!(step.steps <= 16 && step.skipped > 99.0);
 }
+
+/// Slowly at the end, so that an engine would take it for asleep; from wherever it was left.
+#[test]
+fn a_closer_shuts_the_door() {
+    let closing = DOOR.replace("damping = 2.0 }", "damping = 3.0, closer = 1.0 }");
+    for angle in [1.4, -1.4] {
+        let mut physics = scene(&[&closing]);
+        physics.drive(0, angle, 60.0).unwrap();
+        seconds(&mut physics, 2.0, |_| ());
+        assert!((physics.joint(0).unwrap() - angle).abs() < 0.05);
+        physics.release(0).unwrap();
+        seconds(&mut physics, 3.0, |_| ());
+        let left = physics.joint(0).unwrap() / angle;
+        assert!((0.2..0.6).contains(&left), "{left} is left after one time constant");
+        seconds(&mut physics, 12.0, |_| ());
+        assert!(physics.joint(0).unwrap().abs() < 0.02, "{:?}", physics.joint(0));
+    }
+}

@@ -16,13 +16,15 @@ const WANTS_AWAY: (f32, f32) = (0.3, 0.15);
 const WANTS_NO_MORE: (f32, f32) = (0.1, 0.3);
 /// Seconds that an interaction waits for what does not come: an arm that reaches, a way that is free.
 const PATIENCE: f32 = 3.0;
-/// Metres a second through a door.
+/// Metres a second through a door, and to where it stands in the end.
 const THROUGH: f32 = 1.2;
+const AWAY: f32 = 0.6;
 /// Along the way: nearer to the handle than the first nobody walks on; from the second on at full
 /// speed. Metres.
 const HANDLE: [f32; 2] = [0.3, 0.5];
-/// Metres from where it is to stand in the end.
+/// Metres from where it is to stand in the end: beyond a door, elsewhere.
 const ARRIVED: f32 = 0.25;
+const STOOD: f32 = 0.12;
 /// Metres a second below which it stands.
 const STANDS: f32 = 0.15;
 
@@ -132,7 +134,8 @@ impl Actor {
         self.turn_phase(&mut acting, interaction, root);
         if acting.phase == Phase::Exit && acting.time >= interaction.clip.end {
             let way = through(&acting, interaction, root, around);
-            if way.is_none_or(|left| left.length() < ARRIVED || acting.late > PATIENCE) {
+            let arrived = if interaction.clip.walks == Walks::Always { ARRIVED } else { STOOD };
+            if way.is_none_or(|left| left.length() < arrived || acting.late > PATIENCE) {
                 self.stage = Stage::Acting(acting);
                 self.let_go(around);
                 self.stage = Stage::Free;
@@ -156,6 +159,9 @@ impl Actor {
     ) -> bool {
         let waits = self.pace < 0.2 || acting.time >= interaction.clip.end;
         acting.late = if waits { acting.late + dt } else { 0.0 };
+        if self.slips {
+            return true;
+        }
         if acting.phase != Phase::Enter {
             return acting.late > PATIENCE && self.pace < 0.2;
         }
@@ -206,9 +212,11 @@ impl Actor {
     ) -> Intent {
         let yaw = acting.stand.1;
         let standing = standing(ahead(yaw));
+        let over = acting.time >= interaction.clip.end;
         match interaction.clip.walks {
             Walks::Always if acting.phase != Phase::Enter => {}
             Walks::Hold if acting.phase == Phase::Hold && !acting.leaving => return wish.intent,
+            _ if over => {}
             _ => return standing,
         }
         if let Some(Action::Push { force, speed, .. }) = interaction.action {
@@ -232,7 +240,8 @@ impl Actor {
         });
         let held = acting.deed == [true, false];
         let free = ((gap - HANDLE[0]) / (HANDLE[1] - HANDLE[0])).clamp(0.0, 1.0);
-        let speed = THROUGH * if held { free } else { 1.0 };
+        let most = if over && interaction.clip.walks != Walks::Always { AWAY } else { THROUGH };
+        let speed = most * if held { free } else { 1.0 };
         let speed = speed.min(2.0 * left.length());
         Intent { velocity: way * speed, ..standing }
     }
@@ -258,8 +267,7 @@ fn through(
     around: &dyn Surroundings,
 ) -> Option<Vec2> {
     let exit = &interaction.exit;
-    let walks = interaction.clip.walks == Walks::Always && exit.when == When::ClipEnds;
-    let place = exit.place.filter(|_| walks)?;
+    let place = exit.place?;
     let frame = around.frame(acting.object, &exit.on)?;
     let (place, _) = stand(frame, place, 0.0);
     Some(place - level(root.position))

@@ -3,6 +3,7 @@
 use ambulo_control::Model;
 use ambulo_layers::{
     FootPlacement, FootSettings, Limb as Bones, LimbSettings, LookAt, LookJoint, LookSettings,
+    StepSettings,
 };
 use ambulo_rig::{Roles, Skeleton, Transform};
 
@@ -14,6 +15,8 @@ const LOOK: [(f32, [f32; 2]); 3] = [(0.2, [0.25, 0.15]), (0.3, [0.5, 0.3]), (0.5
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs)]
 pub enum BodyError {
+    #[error("its network does not stand")]
+    Stands,
     #[error("no joints are known as its {0}")]
     Role(&'static str),
     #[error("its {what}: {reason}")]
@@ -26,6 +29,7 @@ pub struct Body {
     pub(crate) skeleton: Skeleton,
     pub(crate) hips: usize,
     pub(crate) arms: [Bones; 2],
+    pub(crate) legs: [Bones; 2],
     /// Where a palm is in its wrist's frame: fingers along +Z, back of the hand +Y.
     pub(crate) palms: [Transform; 2],
     /// Feet under the network's motion, and under a clip that stands.
@@ -52,19 +56,29 @@ impl Body {
         let hands = roles.hands.ok_or(BodyError::Role("hands"))?;
         let head = roles.head.ok_or(BodyError::Role("head"))?;
         let feet = model.feet();
-        let floor = |toe: usize| rest[feet.joints[toe]].translation.y - feet.heights[toe];
-        let floor = floor(1).min(floor(3));
+        let stance = model.stance().ok_or(BodyError::Stands)?;
         let part =
             |what, reason: &dyn ToString| BodyError::Part { what, reason: reason.to_string() };
         let arm = |hand: usize| {
             Bones::new(&skeleton, hand, &rest, LimbSettings { softness: 0.01, ..LimbSettings::ARM })
                 .map_err(|error| part("arms", &error))
         };
+        let ankles = roles.feet.ok_or(BodyError::Role("feet"))?;
+        let leg = |ankle: usize| {
+            Bones::new(
+                &skeleton,
+                ankle,
+                &stance,
+                LimbSettings { softness: 0.01, ..LimbSettings::LEG },
+            )
+            .map_err(|error| part("legs", &error))
+        };
         let place = |settings| {
-            FootPlacement::new(&skeleton, &roles, &rest, floor, settings)
+            FootPlacement::new(&skeleton, &roles, &stance, 0.0, settings)
                 .map_err(|error| part("feet", &error))
         };
-        let standing = FootSettings { leash: 0.3, ..FootSettings::default() };
+        let steps = Some(StepSettings::default());
+        let standing = FootSettings { steps, ..FootSettings::default() };
         let (walking_feet, standing_feet) = (place(FootSettings::default())?, place(standing)?);
         let settings = LookSettings::default();
         let look = LookAt::new(&skeleton, &gazers(&skeleton, hips, head), &rest, settings)
@@ -73,6 +87,7 @@ impl Body {
         let thighs = roles.thighs.ok_or(BodyError::Role("thighs"))?;
         Ok(Self {
             arms: [arm(hands[0])?, arm(hands[1])?],
+            legs: [leg(ankles[0])?, leg(ankles[1])?],
             palms: [palm(0)?, palm(1)?],
             feet: walking_feet,
             standing_feet,

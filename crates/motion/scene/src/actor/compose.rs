@@ -1,6 +1,6 @@
 //! The second half of a frame: from the network's pose to the one that is shown.
 
-use ambulo_layers::{Ground, Reach};
+use ambulo_layers::{Ground, Reach, Want};
 use ambulo_rig::glam::Quat;
 use ambulo_rig::{Pose, Transform};
 
@@ -12,6 +12,10 @@ use crate::surroundings::Surroundings;
 
 /// A hand within this share of the farthest that it reaches slows the clip, which stops there.
 const STRETCH: f32 = 0.04;
+/// Arms longer than this share of their reach pull the hips.
+const COMFORT: f32 = 0.95;
+/// A hand that is farther than this from what it holds has slipped off, metres.
+const SLIP: f32 = 0.008;
 /// From this weight on a hand is expected at its target.
 const DUE: f32 = 0.85;
 
@@ -34,6 +38,7 @@ impl Actor {
         self.place_feet(acting, dt, around);
         self.carry(around);
         self.lead_hands(acting, around);
+        self.keep_out(acting, around);
         self.turn_head(acting, dt, around);
         for (joint, upper) in self.body.upper.iter().enumerate() {
             if *upper {
@@ -69,7 +74,11 @@ impl Actor {
         if one.motion.is_none() {
             return Source::Network;
         }
-        match (one.interaction.clip.walks, acting.phase) {
+        let clip = &one.interaction.clip;
+        if acting.time >= clip.end {
+            return Source::Network;
+        }
+        match (clip.walks, acting.phase) {
             (Walks::Always, _) | (Walks::Hold, Phase::Hold) => Source::Upper(acting.which),
             _ => Source::Clip(acting.which),
         }
@@ -172,13 +181,36 @@ impl Actor {
             None => (&self.body.feet, self.controller.contacts(), None),
         };
         let ground = Ground { terrain, level };
+        let hands = [Limb::LeftHand, Limb::RightHand];
+        let wants = [0, 1].map(|side| self.hand_wants(acting, hands[side], side, around));
+        // Hips that are led themselves heed nobody.
+        let led = self.led.iter().any(|led| led.limb == Limb::Hips);
+        let wants = if led { &[][..] } else { &wants[..] };
         let skeleton = &self.body.skeleton;
-        let (pose, global) = (&mut self.shown, &mut self.global);
-        feet.step(skeleton, &mut self.feet, contacts, &ground, dt, pose, global);
+        let (state, pose, global) = (&mut self.feet, &mut self.shown, &mut self.global);
+        feet.step_reaching(skeleton, state, contacts, &ground, wants, dt, pose, global);
+    }
+
+    /// What an arm wants of the hips so that its hand reaches.
+    fn hand_wants(
+        &self,
+        acting: Option<Acting>,
+        limb: Limb,
+        side: usize,
+        around: &dyn Surroundings,
+    ) -> Want {
+        let Some((weight, wanted, _)) = self.wanted(acting, limb, around) else {
+            return Want::default();
+        };
+        let arm = self.body.arms[side];
+        let root = self.global[arm.joints()[0]].translation;
+        let target = (wanted * self.body.palms[side].inverse()).translation;
+        let reach = arm.span(&self.global).exact;
+        Want { root, target, comfort: COMFORT * reach, reach, weight }
     }
 
     fn lead_hands(&mut self, acting: Option<Acting>, around: &dyn Surroundings) {
-        self.pace = 1.0;
+        (self.pace, self.slips) = (1.0, false);
         for (side, limb) in [Limb::LeftHand, Limb::RightHand].into_iter().enumerate() {
             let Some((weight, wanted, turned)) = self.wanted(acting, limb, around) else {
                 continue;
@@ -206,7 +238,34 @@ impl Actor {
             }
             arm.reach(&self.body.skeleton, &asked, &mut self.shown, &mut self.global);
             let reached = self.global[wrist] * self.body.palms[side];
+            let off = reached.translation.distance(wanted.translation);
+            self.slips |= weight > 0.999 && off > SLIP && !leaves;
             self.led.push(Led { limb, weight, wanted, reached, turned });
+        }
+    }
+
+    /// Hands that are led nowhere and feet stay out of what is solid.
+    fn keep_out(&mut self, acting: Option<Acting>, around: &dyn Surroundings) {
+        let skeleton = &self.body.skeleton;
+        let uses = acting.map(|acting| acting.object);
+        for side in [0, 1] {
+            let limb = [Limb::LeftHand, Limb::RightHand][side];
+            if !self.led.iter().any(|led| led.limb == limb) {
+                let palm = self.palm(side).translation;
+                let arm = self.body.arms[side];
+                let asked = around
+                    .way_out(palm, self.holds)
+                    .map(|out| Reach::at(self.global[arm.joints()[2]].translation + out));
+                if let Some(asked) = asked {
+                    arm.reach(skeleton, &asked, &mut self.shown, &mut self.global);
+                }
+            }
+            let (leg, (toe, _)) = (self.body.legs[side], self.body.toes[side]);
+            let out = around.way_out(self.global[toe].translation, uses.and(self.holds));
+            if let Some(out) = out {
+                let asked = Reach::at(self.global[leg.joints()[2]].translation + out);
+                leg.reach(skeleton, &asked, &mut self.shown, &mut self.global);
+            }
         }
     }
 

@@ -4,7 +4,8 @@ use ambulo_control::Wall;
 use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Terrain, Transform};
 
-use super::{Physics, Refused, level};
+use super::{Physics, Refused, Upright, What, level};
+use crate::parts::Solid;
 use crate::surroundings::{Deed, Surroundings};
 
 /// A walker steps over what ends below the first and under what begins above the second, metres over
@@ -30,8 +31,11 @@ impl Surroundings for Physics {
             let room = Wall { width: within + wall.width, ..*wall };
             room.push_out(place) != place
         };
-        let walls =
-            self.walls.iter().map(|&(start, end, half)| Wall { start, end, width: keep + half });
+        let walls = self.walls.iter().map(|&Upright { start, end, half, .. }| Wall {
+            start,
+            end,
+            width: keep + half,
+        });
         out.extend(walls.filter(near));
         for (index, thing) in self.things.iter().enumerate() {
             let far = level(thing.bodies[0].now.translation).distance(place) > within + 6.0;
@@ -51,6 +55,14 @@ impl Surroundings for Physics {
             place.distance(nearest) - wall.width
         };
         self.sides(object, place, 0.0).map(from).fold(f32::MAX, f32::min)
+    }
+
+    fn way_out(&self, point: Vec3, but: Option<usize>) -> Option<Vec3> {
+        self.solid_at(point, but).map(|(_, out)| out)
+    }
+
+    fn turned(&self, object: usize) -> f32 {
+        self.joint(object).unwrap_or(0.0)
     }
 
     fn frame(&self, object: usize, name: &str) -> Option<Transform> {
@@ -81,6 +93,26 @@ impl Surroundings for Physics {
 }
 
 impl Physics {
+    /// What a point is deepest in, but for the object `but`, and its shortest way out, metres.
+    pub fn solid_at(&self, point: Vec3, but: Option<usize>) -> Option<(What, Vec3)> {
+        let things = self.things.iter().enumerate().filter(|&(object, _)| Some(object) != but);
+        let objects = things.flat_map(|(object, thing)| {
+            thing.parts.iter().enumerate().filter_map(move |(part, shape)| {
+                let at = self.part(object, part)?;
+                let own = at.inverse().transform_point(point);
+                let out = shape.solids.iter().filter_map(|solid| out_of(solid, own));
+                let out = out.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+                Some((What::Object { object, part }, at.rotation * out))
+            })
+        });
+        let walls = self
+            .walls
+            .iter()
+            .enumerate()
+            .filter_map(|(index, wall)| Some((What::Wall { index }, wall.out(point)?)));
+        objects.chain(walls).max_by(|a, b| a.1.length_squared().total_cmp(&b.1.length_squared()))
+    }
+
     /// The sides of what an object has in a walker's way, for somebody who stands at a place.
     fn sides(&self, object: usize, place: Vec2, keep: f32) -> impl Iterator<Item = Wall> + '_ {
         let floor = self.ground.height(place.x, place.y);
@@ -96,6 +128,32 @@ impl Physics {
             let blocks = high > IN_THE_WAY[0] && low < IN_THE_WAY[1];
             print.sides(keep).into_iter().flatten().filter(move |_| blocks)
         })
+    }
+}
+
+/// The shortest way out of a box for a point in its frame.
+fn out_of(solid: &Solid, point: Vec3) -> Option<Vec3> {
+    let off = point - solid.centre;
+    let left = solid.half - off.abs();
+    if left.min_element() <= 0.0 {
+        return None;
+    }
+    let axis = left.min_position();
+    let mut out = Vec3::ZERO;
+    out[axis] = left[axis].copysign(off[axis]);
+    Some(out)
+}
+
+impl Upright {
+    /// The shortest way out of it for a point in it.
+    fn out(&self, point: Vec3) -> Option<Vec3> {
+        let way = (self.end - self.start).normalize_or(Vec2::X);
+        let off = level(point) - self.start;
+        let across = off.dot(way.perp());
+        let (along, length) = (off.dot(way), self.start.distance(self.end));
+        let inside = across.abs() < self.half && (0.0..length).contains(&along);
+        let out = way.perp() * (self.half - across.abs()).copysign(across);
+        (inside && point.y < self.top).then(|| Vec3::new(out.x, 0.0, out.y))
     }
 }
 

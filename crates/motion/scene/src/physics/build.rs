@@ -9,7 +9,7 @@ use rapier3d::dynamics::{
 use rapier3d::geometry::{Array2, ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
 use rapier3d::pipeline::PhysicsWorld;
 
-use super::{Body, Physics, STEP, Thing, What, to_pose, to_vector};
+use super::{Body, Physics, STEP, Thing, Upright, What, to_pose, to_vector};
 use crate::exact::compose;
 use crate::ground::{GroundPieces, Piece, step_height};
 use crate::object::{Object, yawed};
@@ -75,8 +75,12 @@ pub(super) fn build(scene: &Scene) -> Physics {
     world.integration_parameters.dt = 0.0;
     world.step();
     world.integration_parameters.dt = STEP;
-    let walls = scene.walls.iter();
-    let walls = walls.map(|w| (w.start.into(), w.end.into(), 0.5 * w.thickness)).collect();
+    let walls = scene.walls.iter().map(|wall| {
+        let (start, end) = (Vec2::from(wall.start), Vec2::from(wall.end));
+        let top = foot(wall, &ground) + wall.height;
+        Upright { start, end, half: 0.5 * wall.thickness, top }
+    });
+    let walls = walls.collect();
     Physics { world, ground, things, walls, person: None, since: 0.0 }
 }
 
@@ -141,10 +145,16 @@ fn add_ground(piece: &Piece, world: &mut PhysicsWorld) {
     }
 }
 
+/// Where a wall begins: the lower of the grounds at its ends.
+fn foot(wall: &Wall, ground: &GroundPieces) -> f32 {
+    let [start, end] = [wall.start, wall.end];
+    ground.height(start[0], start[1]).min(ground.height(end[0], end[1]))
+}
+
 fn add_wall(wall: &Wall, index: usize, ground: &GroundPieces, world: &mut PhysicsWorld) {
     let (start, end) = (Vec2::from(wall.start), Vec2::from(wall.end));
     let (along, middle) = (end - start, (start + end) * 0.5);
-    let low = ground.height(start.x, start.y).min(ground.height(end.x, end.y));
+    let low = foot(wall, ground);
     let yaw = libm::atan2f(along.x, along.y);
     let at = Transform::new(Vec3::new(middle.x, low, middle.y), yawed(yaw));
     let half = Vec3::new(wall.thickness * 0.5, wall.height, along.length() * 0.5);
@@ -189,7 +199,9 @@ fn add_part(
         }
         // What hangs on a hinge or a spring is balanced: weight would only wear the hinge.
         Motion::Hinge { mass, .. } | Motion::Slide { mass, .. } => {
-            let body = RigidBodyBuilder::dynamic().gravity_scale(0.0);
+            // What shuts by itself does so too slowly for the engine to count it as awake.
+            let shuts = matches!(part.motion, Motion::Hinge { closer, .. } if closer > 0.0);
+            let body = RigidBodyBuilder::dynamic().gravity_scale(0.0).can_sleep(!shuts);
             (body, mass, 0.3, groups(JOINTED, LOOSE | CHARACTER))
         }
     };

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::actor::{Actor, Phase, Told};
 use crate::interaction::{Action, Limb};
-use crate::{Physics, STEP, Scene};
+use crate::{Physics, STEP, Scene, What};
 
 /// Seconds after a change in which a jump counts as its own.
 const TRANSITION: f32 = 0.6;
@@ -15,7 +15,7 @@ const PLAIN: f32 = 1.5;
 /// A limb whose weight is above this is where it should be.
 const WHOLE: f32 = 0.999;
 /// Metres that a character walks, and how much of its height its hips regain, to have stood up.
-const STOOD: (f32, f32) = (1.0, 0.9);
+const STOOD: (f32, f32) = (0.5, 0.9);
 
 /// Greatest, mean and count of a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -71,7 +71,7 @@ pub struct Measured {
     pub farthest: String,
     /// Along the ground, of the ball of a foot while the feet's layer holds it, a frame.
     pub skate_cm: Numbers,
-    /// Sits, and those of them after which it stood up and walked a metre.
+    /// Sits, and those of them after which it stood up and walked half a metre.
     pub sits: u32,
     /// As above.
     pub stood_up: u32,
@@ -132,14 +132,14 @@ impl Measure {
         Measured { seconds, undone: undone.into(), ..self.measured.clone() }
     }
 
-    pub fn frame(&mut self, actor: &Actor, world: &Physics, scene: &Scene, told: Option<Told>) {
+    pub fn frame(&mut self, actor: &Actor, world: &Physics, told: Option<Told>) {
         self.time += STEP;
         self.since += STEP;
         self.change(actor, told);
         self.limbs(actor);
         self.jumps(actor);
         self.feet(actor);
-        self.depths(actor, world, scene);
+        self.depths(actor, world);
         self.stood(actor, world);
         self.root = actor.root().position;
         self.before.clear();
@@ -230,7 +230,7 @@ impl Measure {
         self.held = held;
     }
 
-    fn depths(&mut self, actor: &Actor, world: &Physics, scene: &Scene) {
+    fn depths(&mut self, actor: &Actor, world: &Physics) {
         let global = actor.global();
         let palms = [0, 1].map(|side| (usize::MAX - side, actor.palm(side).translation));
         let joints = global.iter().enumerate().map(|(joint, at)| (joint, at.translation));
@@ -241,7 +241,7 @@ impl Measure {
         let middles = self.parents.iter().enumerate().filter_map(middle);
         let mut worst = (0.0, 0, String::new());
         for (joint, point) in joints.chain(middles).chain(palms) {
-            let (depth, what) = self.depth(point, world, scene);
+            let (depth, what) = self.depth(point, world);
             if depth > worst.0 {
                 worst = (depth, joint, what);
             }
@@ -255,35 +255,19 @@ impl Measure {
         self.measured.penetration_cm.add(depth);
     }
 
-    fn depth(&self, point: Vec3, world: &Physics, scene: &Scene) -> (f32, String) {
-        let mut worst = (world.height(point.x, point.z) - point.y, String::from("the ground"));
-        for (object, name) in self.objects.iter().enumerate() {
-            for (part, shape) in world.parts(object).iter().enumerate() {
-                let Some(at) = world.part(object, part) else { continue };
-                if at.translation.distance(point) > 4.0 {
-                    continue;
-                }
-                let own = at.inverse().transform_point(point);
-                for solid in &shape.solids {
-                    let depth = (solid.half - (own - solid.centre).abs()).min_element();
-                    if depth > worst.0 {
-                        worst = (depth, format!("{name}'s {}", shape.name));
-                    }
-                }
-            }
+    fn depth(&self, point: Vec3, world: &Physics) -> (f32, String) {
+        let ground = (world.height(point.x, point.z) - point.y, String::from("the ground"));
+        let Some((what, out)) = world.solid_at(point, None) else { return ground };
+        if out.length() < ground.0 {
+            return ground;
         }
-        for wall in &scene.walls {
-            let (start, end) = (Vec3::new(wall.start[0], 0.0, wall.start[1]), wall.end);
-            let along = Vec3::new(end[0], 0.0, end[1]) - start;
-            let way = along.normalize_or(Vec3::X);
-            let off = (point - start).with_y(0.0);
-            let across = 0.5 * wall.thickness - off.dot(way.cross(Vec3::Y)).abs();
-            let ends = off.dot(way).min(along.length() - off.dot(way));
-            if across.min(ends) > worst.0 && point.y < wall.height {
-                worst = (across.min(ends), "a wall".into());
+        let what = match what {
+            What::Object { object, part } => {
+                format!("{}'s {}", self.objects[object], world.parts(object)[part].name)
             }
-        }
-        worst
+            _ => "a wall".into(),
+        };
+        (out.length(), what)
     }
 
     fn stood(&mut self, actor: &Actor, world: &Physics) {
