@@ -34,6 +34,7 @@ use crate::surroundings::Surroundings;
 use acting::Acting;
 pub use acting::Phase;
 pub use body::{Body, BodyError};
+use deeds::Held;
 pub use moves::{Move, MoveError, Moves};
 
 /// Metres that are kept from walls and objects, and at most from what is used.
@@ -122,6 +123,9 @@ pub struct Led {
     pub reached: Transform,
     /// Whether the rotation is wanted, too.
     pub turned: bool,
+    /// Whether a hand slips off in this frame, because what it held goes where it does not reach; the
+    /// interaction is broken off in the next.
+    pub slips: bool,
 }
 
 /// What a character is about.
@@ -171,8 +175,8 @@ pub struct Actor {
     played: (Source, f32),
     /// A jump within the same clip.
     jumped: bool,
-    /// Which object the hands hold, and how far it is grasped.
-    holds: Option<usize>,
+    /// What the hands hold.
+    holds: Option<Held>,
     /// How quickly the clip goes on: it waits for who does not reach.
     pace: f32,
     /// A hand slipped off what it held.

@@ -18,6 +18,12 @@ const SLOWEST: f32 = 0.12;
 const TURN: [f32; 2] = [1.2, 0.5];
 /// Seconds without getting nearer after which the way is blocked.
 const PATIENCE: f32 = 2.5;
+/// Seconds without getting nearer after which who is nearly there takes another run, how near that is,
+/// from how far before the place, metres, for how long at most, seconds, and how often.
+const AGAIN: f32 = 1.0;
+const NEARLY: f32 = 1.0;
+const RUN: (f32, f32) = (0.7, 2.0);
+const TRIES: u8 = 3;
 /// What counts as nearer: metres, radians.
 const NEARER: [f32; 2] = [0.03, 0.05];
 /// A wish to go faster than this, metres a second, for so long, seconds, and by more than a right angle
@@ -59,6 +65,9 @@ pub struct Walk {
     nearest: [f32; 2],
     stuck: f32,
     away: f32,
+    /// Seconds that are left to step back before another run, and how many are left.
+    back: f32,
+    tries: u8,
 }
 
 impl Walk {
@@ -85,6 +94,8 @@ impl Walk {
             nearest: [f32::INFINITY; 2],
             stuck: 0.0,
             away: 0.0,
+            back: 0.0,
+            tries: TRIES,
         }
     }
 
@@ -111,8 +122,24 @@ impl Walk {
                 (self.nearest[what], self.stuck) = (left[what], 0.0);
             }
         }
+        if self.stuck >= AGAIN && self.tries > 0 && left[0] < NEARLY {
+            (self.tries, self.back) = (self.tries - 1, RUN.1);
+            (self.stuck, self.nearest) = (0.0, [f32::INFINITY; 2]);
+        }
         if self.stuck >= PATIENCE {
             return Going::GaveUp(Why::Blocked);
+        }
+        let ahead = Vec2::new(libm::sinf(self.yaw), libm::cosf(self.yaw));
+        if self.back > 0.0 {
+            // From there it comes straight on, facing as it should.
+            self.back -= dt;
+            let start = to - ahead * RUN.0;
+            if start.length() > 0.3 * RUN.0 {
+                let velocity = start.normalize_or_zero() * self.speed.min(0.8);
+                let (facing, gait) = (Some(ahead), self.pace);
+                return Going::On(Intent { velocity, facing, strafe: 1.0, gait });
+            }
+            (self.back, self.nearest) = (0.0, [f32::INFINITY; 2]);
         }
         // Halfway into what is allowed it stands; so it does not stop at the edge of it.
         let speed = (EASE * left[0]).clamp(SLOWEST, self.speed);
@@ -120,7 +147,7 @@ impl Walk {
         let share = (TURN[0] - left[0]) / (TURN[0] - TURN[1]);
         Going::On(Intent {
             velocity: if walks { to.normalize_or_zero() * speed } else { Vec2::ZERO },
-            facing: Some(Vec2::new(libm::sinf(self.yaw), libm::cosf(self.yaw))),
+            facing: Some(ahead),
             strafe: share.clamp(0.0, 1.0),
             gait: self.pace,
         })

@@ -1,7 +1,7 @@
 //! The second half of a frame: from the network's pose to the one that is shown.
 
-use ambulo_layers::{Ground, Reach, Want};
-use ambulo_rig::glam::Quat;
+use ambulo_layers::{Ground, Limb as Bones, Reach, Want};
+use ambulo_rig::glam::{Quat, Vec3};
 use ambulo_rig::{Pose, Transform};
 
 use super::acting::{Acting, Phase, placed};
@@ -36,9 +36,9 @@ impl Actor {
         // What is shown when something else is played: without what the feet's own layer remembers.
         self.clip.local.clone_from(&self.shown.local);
         self.place_feet(acting, dt, around);
-        self.carry(around);
+        self.carry(dt, around);
         self.lead_hands(acting, around);
-        self.keep_out(acting, around);
+        self.keep_out(around);
         self.turn_head(acting, dt, around);
         for (joint, upper) in self.body.upper.iter().enumerate() {
             if *upper {
@@ -136,7 +136,7 @@ impl Actor {
     }
 
     /// Where a target is to be, if the acting leads that limb now.
-    fn wanted(
+    pub(super) fn wanted(
         &self,
         acting: Option<Acting>,
         limb: Limb,
@@ -161,7 +161,8 @@ impl Actor {
         self.shown.local[hips] = parent.inverse() * own.interpolate(to, weight);
         self.shown.update_global(&self.body.skeleton, hips, &mut self.global);
         let reached = self.global[hips];
-        self.led.push(Led { limb: Limb::Hips, weight, wanted, reached, turned });
+        let limb = Limb::Hips;
+        self.led.push(Led { limb, weight, wanted, reached, turned, slips: false });
     }
 
     fn place_feet(&mut self, acting: Option<Acting>, dt: f32, around: &dyn Surroundings) {
@@ -199,9 +200,9 @@ impl Actor {
         side: usize,
         around: &dyn Surroundings,
     ) -> Want {
-        let Some((weight, wanted, _)) = self.wanted(acting, limb, around) else {
-            return Want::default();
-        };
+        // What is held comes along: there is nothing to bend down to.
+        let wanted = self.wanted(acting, limb, around).filter(|_| self.holds.is_none());
+        let Some((weight, wanted, _)) = wanted else { return Want::default() };
         let arm = self.body.arms[side];
         let root = self.global[arm.joints()[0]].translation;
         let target = (wanted * self.body.palms[side].inverse()).translation;
@@ -230,7 +231,7 @@ impl Actor {
             let distance = self.global[shoulder].translation.distance(goal.translation);
             let most = arm.span(&self.global).exact;
             let leaves = acting.is_some_and(|acting| acting.phase == Phase::Exit);
-            if !leaves {
+            if !leaves && self.holds.is_none() {
                 // Only who should be there already: a hand on its way may be far from it.
                 let due = ((weight - DUE) / (1.0 - DUE)).clamp(0.0, 1.0);
                 let over = (distance / most - 1.0 + STRETCH) / STRETCH * due;
@@ -239,33 +240,47 @@ impl Actor {
             arm.reach(&self.body.skeleton, &asked, &mut self.shown, &mut self.global);
             let reached = self.global[wrist] * self.body.palms[side];
             let off = reached.translation.distance(wanted.translation);
-            self.slips |= weight > 0.999 && off > SLIP && !leaves;
-            self.led.push(Led { limb, weight, wanted, reached, turned });
+            let slips = weight > 0.999 && off > SLIP && !leaves;
+            self.slips |= slips;
+            self.led.push(Led { limb, weight, wanted, reached, turned, slips });
         }
     }
 
     /// Hands that are led nowhere and feet stay out of what is solid.
-    fn keep_out(&mut self, acting: Option<Acting>, around: &dyn Surroundings) {
-        let skeleton = &self.body.skeleton;
-        let uses = acting.map(|acting| acting.object);
+    fn keep_out(&mut self, around: &dyn Surroundings) {
+        let held = self.holds.map(|held| held.object);
         for side in [0, 1] {
-            let limb = [Limb::LeftHand, Limb::RightHand][side];
-            if !self.led.iter().any(|led| led.limb == limb) {
-                let palm = self.palm(side).translation;
-                let arm = self.body.arms[side];
-                let asked = around
-                    .way_out(palm, self.holds)
-                    .map(|out| Reach::at(self.global[arm.joints()[2]].translation + out));
-                if let Some(asked) = asked {
-                    arm.reach(skeleton, &asked, &mut self.shown, &mut self.global);
+            let hand = [Limb::LeftHand, Limb::RightHand][side];
+            let free = !self.led.iter().any(|led| led.limb == hand);
+            let (arm, leg, (toe, _)) =
+                (self.body.arms[side], self.body.legs[side], self.body.toes[side]);
+            // Twice: what leads out of one thing may lead into another.
+            for _ in 0..2 {
+                if free {
+                    let wrist = self.global[arm.joints()[2]].translation;
+                    self.take_out(arm, [self.palm(side).translation, wrist], held, around);
                 }
+                let ankle = self.global[leg.joints()[2]].translation;
+                let toe = self.global[toe].translation;
+                self.take_out(leg, [toe, ankle], held, around);
+                self.take_out(leg, [toe.lerp(ankle, 0.5); 2], held, around);
             }
-            let (leg, (toe, _)) = (self.body.legs[side], self.body.toes[side]);
-            let out = around.way_out(self.global[toe].translation, uses.and(self.holds));
-            if let Some(out) = out {
-                let asked = Reach::at(self.global[leg.joints()[2]].translation + out);
-                leg.reach(skeleton, &asked, &mut self.shown, &mut self.global);
-            }
+        }
+    }
+
+    /// Moves a limb's end by the way out of whichever of two points is deeper in something.
+    fn take_out(
+        &mut self,
+        limb: Bones,
+        points: [Vec3; 2],
+        held: Option<usize>,
+        around: &dyn Surroundings,
+    ) {
+        let [a, b] = points.map(|point| around.way_out(point, held).unwrap_or(Vec3::ZERO));
+        let out = if b.length_squared() > a.length_squared() { b } else { a };
+        if out != Vec3::ZERO {
+            let asked = Reach::at(self.global[limb.joints()[2]].translation + out);
+            limb.reach(&self.body.skeleton, &asked, &mut self.shown, &mut self.global);
         }
     }
 

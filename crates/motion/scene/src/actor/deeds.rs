@@ -1,16 +1,28 @@
 //! What is done to the object.
 
-use ambulo_rig::Transform;
 use ambulo_rig::glam::{Mat3, Quat, Vec2, Vec3};
+use ambulo_rig::{Transform, share};
 
 use super::acting::{Acting, Phase};
 use super::{Actor, Stage, ahead};
 use crate::Push;
-use crate::interaction::{Action, Hand, Interaction};
+use crate::interaction::{Action, Hand, Interaction, Limb};
 use crate::surroundings::{Deed, Surroundings};
 
+/// Half-life in seconds of the way from where something was taken hold of to where the hands have it.
+const COMES: f32 = 0.15;
 /// 1/s: how quickly a box makes up for being too near or too far from who pushes it.
 const CATCH_UP: f32 = 5.0;
+
+/// Something in the hands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Held {
+    pub object: usize,
+    /// From where the pose has the hands to where they hold it.
+    offset: Transform,
+    /// How high over the ground the hands took hold of it, metres.
+    height: f32,
+}
 
 impl Actor {
     /// Tells the object what is done to it in this frame. What it cannot do it does not: who leads a
@@ -68,7 +80,7 @@ impl Actor {
     pub(super) fn let_go(&mut self, around: &mut dyn Surroundings) {
         let Stage::Acting(acting) = self.stage else { return };
         if let Some(held) = self.holds.take() {
-            let _ = around.act(held, Deed::Detach);
+            let _ = around.act(held.object, Deed::Detach);
         }
         let interaction = &self.moves.all()[acting.which].interaction;
         let deed = match interaction.action {
@@ -82,7 +94,10 @@ impl Actor {
     }
 
     /// Takes hold of a box as soon as its time has come, and carries it where the pose has the hands.
-    pub(super) fn carry(&mut self, around: &mut dyn Surroundings) {
+    ///
+    /// It is held at the frame of the points that the hands are led to. At first that is where it lies;
+    /// then it comes to where the clip has the hands, whoever's hands they are.
+    pub(super) fn carry(&mut self, dt: f32, around: &mut dyn Surroundings) {
         let Stage::Acting(acting) = self.stage else { return };
         let moves = self.moves.clone();
         let action = &moves.all()[acting.which].interaction.action;
@@ -90,29 +105,24 @@ impl Actor {
         if acting.deed != [true, false] {
             return;
         }
-        let holder = self.holder(hands);
-        let deed = match self.holds {
-            Some(_) => Deed::Carry(holder),
-            None => Deed::Attach(holder),
-        };
-        if around.act(acting.object, deed).is_ok() {
-            self.holds = Some(acting.object);
+        let holder = held_by(hands, |side| Some(self.palm(side)));
+        let Some(holder) = holder else { return };
+        let ground = |at: Vec3| around.terrain().height(at.x, at.z);
+        if let Some(held) = &mut self.holds {
+            held.offset = held.offset.interpolate(Transform::IDENTITY, share(COMES, dt));
+            let mut at = holder * held.offset;
+            // Not lower than it lay: what is put down comes to lie as it was picked up.
+            at.translation.y = at.translation.y.max(ground(at.translation) + held.height);
+            let _ = around.act(held.object, Deed::Carry(at));
+            return;
         }
-    }
-
-    /// The frame that a held object hangs on: the palm, or between both palms, upright, its x from the
-    /// right one to the left.
-    fn holder(&self, hands: &[Hand]) -> Transform {
-        let palm = |hand: &Hand| self.palm(usize::from(*hand == Hand::RightHand));
-        match hands {
-            [one] => palm(one),
-            _ => {
-                let [left, right] = [self.palm(0), self.palm(1)];
-                let across = left.translation - right.translation;
-                let x = Vec3::new(across.x, 0.0, across.z).normalize_or(Vec3::X);
-                let turn = Quat::from_mat3(&Mat3::from_cols(x, Vec3::Y, x.cross(Vec3::Y)));
-                Transform::new((left.translation + right.translation) * 0.5, turn)
-            }
+        let limbs = [Limb::LeftHand, Limb::RightHand];
+        let point = |side: usize| Some(self.wanted(Some(acting), limbs[side], around)?.1);
+        let Some(points) = held_by(hands, point) else { return };
+        let height = points.translation.y - ground(points.translation);
+        let (object, offset) = (acting.object, holder.inverse() * points);
+        if around.act(object, Deed::Attach(points)).is_ok() {
+            self.holds = Some(Held { object, offset, height });
         }
     }
 
@@ -120,4 +130,17 @@ impl Actor {
     pub(crate) fn palm(&self, side: usize) -> Transform {
         self.global[self.body.arms[side].joints()[2]] * self.body.palms[side]
     }
+}
+
+/// The frame that a held object hangs on: that of one hand, or between both, upright, its x from the
+/// right one to the left.
+fn held_by(hands: &[Hand], at: impl Fn(usize) -> Option<Transform>) -> Option<Transform> {
+    if let [one] = hands {
+        return at(usize::from(*one == Hand::RightHand));
+    }
+    let [left, right] = [at(0)?, at(1)?];
+    let across = left.translation - right.translation;
+    let x = Vec3::new(across.x, 0.0, across.z).normalize_or(Vec3::X);
+    let turn = Quat::from_mat3(&Mat3::from_cols(x, Vec3::Y, x.cross(Vec3::Y)));
+    Some(Transform::new((left.translation + right.translation) * 0.5, turn))
 }

@@ -53,6 +53,8 @@ pub struct Measured {
     pub hand_farthest: String,
     /// And how it is turned.
     pub hand_degrees: Numbers,
+    /// How often a hand slipped off what it held; such frames do not count above.
+    pub slips: u32,
     /// Hips from where they should be while they are seated.
     pub hips_cm: Numbers,
     /// And how they are turned.
@@ -176,6 +178,10 @@ impl Measure {
         let file = actor.about().map(|about| &actor.moves().all()[about.which].file);
         let hold = actor.about().and_then(|about| about.clip).map(|clip| clip.0);
         for led in actor.led().iter().filter(|led| led.weight >= WHOLE) {
+            if led.slips {
+                self.measured.slips += 1;
+                continue;
+            }
             let off = 100.0 * led.wanted.translation.distance(led.reached.translation);
             let turned = led.wanted.rotation.angle_between(led.reached.rotation).to_degrees();
             let (way, angle) = match led.limb {
