@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from ambulo import Controller, load_model
@@ -50,3 +51,26 @@ def test_it_goes_as_fast_as_it_is_asked(model, gait: str, speed: float, aside: f
     assert abs(yaw) < 0.3, "it faces where it is asked to"
     head = character.positions()[:, 1].max() - character.root[1]
     assert (0.9 if gait == "crouch" else 1.3) < head < (1.5 if gait == "crouch" else 1.9)
+
+
+@pytest.mark.parametrize("responsive", [False, True])
+@pytest.mark.parametrize("speed", [1.3, 2.6])
+@pytest.mark.parametrize("angle", [45, 90, 135, 180, 225])
+def test_it_turns_sharply_and_does_not_run_off(
+    model, angle: int, speed: float, responsive: bool
+) -> None:
+    # The future was bent otherwise than in the training, and asked for a facing far ahead of the
+    # way: asked to turn about in a walk of 1.3 m/s, it ran off at 4.7 m/s.
+    way = np.array([math.sin(math.radians(angle)), math.cos(math.radians(angle))])
+    for seconds in (3.0, 3.35, 3.7):
+        character = Controller(model, responsive=responsive)
+        places = []
+        for frame in range(round((seconds + 5.0) * 60)):
+            asked = (0.0, speed) if frame < seconds * 60 else tuple(speed * way)
+            character.step(1 / 60, asked, gait="auto")
+            places.append((character.root[0], character.root[2]))
+        velocity = np.diff(places, axis=0)[round(seconds * 60) - 1 :] * 60
+        reached = np.hypot(*velocity.T)
+        assert reached.max() < 1.35 * speed, f"after {seconds} s"
+        there = (velocity @ way > math.cos(math.radians(20)) * reached) & (reached >= 0.9 * speed)
+        assert there[:120].any(), f"after {seconds} s"

@@ -12,7 +12,7 @@ from ambulo.starter_motion.intent import Wish
 from ambulo.starter_motion.noise import Chance
 from ambulo.starter_motion.perform import LEAD, StarterClip, perform
 
-MINUTES = 16.0
+MINUTES = 18.0
 MIXED_SECONDS = 60.0
 SHORTEST = 6.0
 PI = float(np.pi)
@@ -167,6 +167,18 @@ def _reversals(chance: Chance) -> Iterator[Wish]:
         yield Wish(chance.uniform(1.8, 3.2), gait, speed, bend=bend)
 
 
+def _sharp_turns(gait: str, low: float, high: float) -> Callable[[Chance], Iterator[Wish]]:
+    """Straight on, then off another way at once: braked, turned, sped up again; both sides."""
+
+    def wishes(chance: Chance) -> Iterator[Wish]:
+        while True:
+            speed = chance.uniform(low, high)
+            bend = chance.choice((-1.0, 1.0)) * chance.uniform(0.25, 1.0) * PI
+            yield Wish(chance.uniform(1.7, 2.8), gait, speed, bend=bend)
+
+    return wishes
+
+
 def _back_and_forth(chance: Chance) -> Iterator[Wish]:
     """Forward, back and sideways with the facing kept: as when aiming."""
     while True:
@@ -265,6 +277,8 @@ STUDIES = (
     Study("start_stop", 1, 24.0, _start_stop),
     Study("transitions", 1, 24.0, _transitions),
     Study("reversal", 1, 20.0, _reversals),
+    Study("sharp_turn_walk", 2, 34.0, _sharp_turns("walk", 0.9, 1.7)),
+    Study("sharp_turn_jog", 2, 26.0, _sharp_turns("jog", 2.0, 3.0)),
     Study("back_and_forth", 1, 20.0, _back_and_forth),
     Study("crouch_walk", 1, 16.0, _steady("crouch", 0.4, 1.1, 0.6)),
     Study("crouch_idle", 1, 16.0, _crouch_idle),
