@@ -192,6 +192,71 @@ def clip_rows(
     model: Model, path: str, *, axes: str | None = None, mirrored: bool = False
 ) -> _ClipRows: ...
 
+# -- scenes ---------------------------------------------------------------------------------------
+
+class SceneFileError(ValueError):
+    """A scene, an interaction or a script that is refused."""
+
+    problems: list[tuple[str, str]]
+
+def read_scene(text: str, interactions: dict[str, str] | None = None) -> str: ...
+def read_interaction(text: str) -> str: ...
+def read_script(text: str, scene: str | None = None) -> str: ...
+def document_place(text: str, path: str) -> tuple[int, int] | None: ...
+
+class ScenePartFacts(TypedDict):
+    object: int
+    name: str
+    moves: bool
+    solids: list[tuple[list[float], list[float]]]
+    frames: dict[str, list[float]]
+
+class Visit:
+    """A character that plays a script in a scene."""
+
+    dt: float
+    def __init__(
+        self,
+        model: Model,
+        scene: str,
+        script: str,
+        interactions: dict[str, str],
+        clips: dict[str, Clip],
+        seed: int = 0,
+    ) -> None: ...
+    def step(self, frames: int = 1) -> bool: ...
+    @property
+    def time(self) -> float: ...
+    def positions(self) -> Floats: ...
+    def tips(self) -> Floats: ...
+    @property
+    def root(self) -> tuple[float, float, float, float]: ...
+    @property
+    def contacts(self) -> list[float]: ...
+    @property
+    def stands(self) -> list[bool]: ...
+    def led(self) -> list[tuple[str, float, list[float], list[float]]]: ...
+    def part_transforms(self) -> Floats: ...
+    def parts(self) -> list[ScenePartFacts]: ...
+    def scene(self) -> str: ...
+    def heights(self, x: Floats, z: Floats) -> Floats: ...
+    def happened(self) -> str: ...
+    def measured(self) -> str: ...
+
+def visit_seeds(
+    model: Model,
+    scene: str,
+    script: str,
+    interactions: dict[str, str],
+    clips: dict[str, Clip],
+    seeds: Sequence[int],
+    *,
+    threads: int = 1,
+    progress: Callable[[int], object] | None = None,
+) -> str: ...
+
+# -- creatures ------------------------------------------------------------------------------------
+
 class CreatureFileError(ValueError):
     problems: list[tuple[str, str]]
 

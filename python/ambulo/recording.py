@@ -103,6 +103,13 @@ class Recording:
         """T."""
         return len(self.positions)
 
+    def cut(self, rows: slice) -> Recording:
+        """Some of its frames."""
+        per_frame = (
+            "positions", "tips", "root", "facing", "gait", "leg", "lap", "contacts", "asked",
+        )  # fmt: skip
+        return replace(self, **{name: getattr(self, name)[rows] for name in per_frame})
+
     def without_joints(self) -> Recording:
         """The same path with no joints and no tips."""
         none: dict[str, Any] = {"names": (), "parents": (), "tip_joints": ()}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,11 +154,15 @@ class SceneRecording:
     """(seconds, text) in order of time, as (2.5, "sit: enter"); each is shown until the next."""
     targets: Mapping[str, Floats] = field(default_factory=dict)
     """By name (T, 3) points that limbs are led to, metres, NaN where there is none: small marks."""
+    began: float = 0.0
+    """Seconds at the first frame: what is written under pictures counts from there."""
 
     def __post_init__(self) -> None:
         frames = self.character.frames
         if frames < 1:
             raise ValueError("SceneRecording.character has no frames")
+        if not np.isfinite(self.began):
+            raise ValueError(f"SceneRecording.began must be finite, not {self.began}")
         for what in ("positions", "tips", "root", "facing"):
             _shaped(f"SceneRecording.character.{what}", getattr(self.character, what), None)
         seen: set[tuple[str, str]] = set()
@@ -195,6 +199,26 @@ class SceneRecording:
     def duration(self) -> float:
         """Seconds from the first frame to the last."""
         return (self.frames - 1) / self.fps
+
+    def cut(self, start: float, stop: float) -> SceneRecording:
+        """The frames of the seconds `start` to `stop`, as far as there are any."""
+        first = min(max(round(start * self.fps), 0), self.frames - 1)
+        last = min(max(round(stop * self.fps), first), self.frames - 1)
+        rows, since = slice(first, last + 1), first / self.fps
+        events = [(max(time - since, 0.0), text) for time, text in self.events
+                  if time <= last / self.fps]  # fmt: skip
+        over = sum(time <= 0.0 for time, _ in events)  # of those before only the last goes on
+        return replace(
+            self,
+            character=self.character.cut(rows),
+            parts=tuple(
+                replace(part, transforms=part.transforms[rows]) if part.moves else part
+                for part in self.parts
+            ),
+            events=tuple(events[max(over - 1, 0) :]),
+            targets={name: points[rows] for name, points in self.targets.items()},
+            began=self.began + since,
+        )
 
     def targets_at(self, frame: float) -> NDArray[np.float64]:
         """(M, 3) the targets that there are at the frame nearest to `frame`."""

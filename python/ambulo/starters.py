@@ -1,4 +1,4 @@
-"""What ships with the project: where the starter model and the creatures lie."""
+"""What ships with the project: where the starter model, the creatures and the scenes lie."""
 
 from __future__ import annotations
 
@@ -26,3 +26,15 @@ def starter_model() -> Path:
 def starter_creatures() -> dict[str, Path]:
     """The creatures' files by name; none where this is not a checkout of the project."""
     return {path.stem: path for path in sorted((FOLDER / "creatures").glob("*.json"))}
+
+
+def starter_scene() -> Path:
+    """The playground: a scene with one of everything; its script is `playground-visit.toml`.
+
+    Raises:
+        FileNotFoundError: this is not a checkout of the project.
+    """
+    path = FOLDER / "scenes" / "playground.toml"
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing: it comes with a checkout of the project")
+    return path

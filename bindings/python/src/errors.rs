@@ -5,6 +5,7 @@ use std::io;
 use ambulo_body::BodyError;
 use ambulo_dataset::DatasetError;
 use ambulo_formats::files::FileError;
+use ambulo_scene::{FileError as SceneError, VisitError};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -21,6 +22,14 @@ pyo3::create_exception!(
     CreatureFileError,
     PyValueError,
     "A creature file that is refused. `problems` is a list of (path in the document, reason)."
+);
+
+pyo3::create_exception!(
+    ambulo,
+    SceneFileError,
+    PyValueError,
+    "A scene, an interaction or a script that is refused. `problems` is a list of (path in the \
+     document, reason)."
 );
 
 /// Input that cannot be used: `ValueError`, with the error's own words.
@@ -65,4 +74,19 @@ pub fn creature_error(py: Python<'_>, error: BodyError) -> PyErr {
     let raised = CreatureFileError::new_err(error.to_string());
     let problems: Vec<_> = error.problems().into_iter().map(|p| (p.path, p.reason)).collect();
     raised.value(py).setattr("problems", problems).err().unwrap_or(raised)
+}
+
+/// A scene, an interaction or a script that is refused.
+pub fn scene_error(py: Python<'_>, error: SceneError) -> PyErr {
+    let raised = SceneFileError::new_err(error.to_string());
+    let problems: Vec<_> = error.problems().into_iter().map(|p| (p.path, p.reason)).collect();
+    raised.value(py).setattr("problems", problems).err().unwrap_or(raised)
+}
+
+/// A visit that cannot begin.
+pub fn visit_error(py: Python<'_>, error: VisitError) -> PyErr {
+    match error {
+        VisitError::File(error) => scene_error(py, error),
+        error => value_error(error),
+    }
 }

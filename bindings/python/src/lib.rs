@@ -7,6 +7,7 @@ mod errors;
 mod feet;
 mod model;
 mod motion;
+mod scene;
 
 use pyo3::prelude::*;
 
@@ -22,9 +23,13 @@ mod _core {
         clip_rows, dataset_build, dataset_categories, dataset_check, dataset_plan,
     };
     #[pymodule_export]
-    use crate::errors::{CreatureFileError, MotionFileError};
+    use crate::errors::{CreatureFileError, MotionFileError, SceneFileError};
     #[pymodule_export]
     use crate::model::{Model, joint_rotations, layout, phase_shares};
     #[pymodule_export]
     use crate::motion::{Clip, motion_axes, read_motion, write_motion};
+    #[pymodule_export]
+    use crate::scene::{
+        Visit, document_place, read_interaction, read_scene, read_script, visit_seeds,
+    };
 }

@@ -22,7 +22,7 @@ use crate::errors::{file_error, value_error};
 /// A skeleton's motion; immutable.
 #[pyclass(frozen, module = "ambulo")]
 pub struct Clip {
-    clip: rig::Clip,
+    pub clip: rig::Clip,
     /// How the file that it comes from writes it.
     dialect: Option<Dialect>,
 }

@@ -17,6 +17,7 @@ from ambulo.cli.evaluate import evaluate
 from ambulo.cli.evolve import evolve
 from ambulo.cli.motion import motion
 from ambulo.cli.replay import replay
+from ambulo.cli.scene import scene
 from ambulo.cli.starter import starter
 from ambulo.cli.stopping import STOPPED
 from ambulo.cli.study import study
@@ -30,6 +31,7 @@ EPILOG = """Examples:
   ambulo motion convert captures/ out/ --fps 60 --mirror
   ambulo evolve tetrapod2 run -o out/tetrapod
   ambulo replay out/tetrapod -o out/tetrapod/replay
+  ambulo scene run -o out/visit
 
 Exit codes: 0 done, 1 something failed and was named, 2 wrong usage, 130 stopped by Ctrl-C."""
 
@@ -84,7 +86,7 @@ def completion(shell: str) -> None:
 
 COMMANDS = (
     bench, creature, dataset, demo, evaluate, evolve, export, import_, model, motion, replay,
-    starter, study, train, walk,
+    scene, starter, study, train, walk,
 )  # fmt: skip
 for command in COMMANDS:
     cli.add_command(command)

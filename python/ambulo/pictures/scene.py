@@ -146,9 +146,9 @@ def write_scene_strip(
         y = margin + head + row * (size[1] + foot + gap)
         sheet.paste(Image.fromarray(shoot.picture(time, size, marks)), (x, y))
         words, base = font(12.5 * unit), y + size[1] + 17 * unit
-        seconds = f"{time:.1f} s"
+        seconds = f"{recording.began + time:.1f} s"
         draw.text((x, base), seconds, QUIET, words, "ls")
-        aside = words.getlength("00.0 s ") + 4 * unit
+        aside = max(words.getlength("00.0 s "), words.getlength(f"{seconds} ")) + 4 * unit
         draw.text((x + aside, base), recording.event_at(time), INK, words, "ls")
     with replacing(path) as part:
         sheet.save(part, "PNG", optimize=True)
@@ -175,7 +175,7 @@ class _Shoot:
 
 def _fields(recording: SceneRecording, time: float) -> list[tuple[str, str]]:
     """The labelled values under a picture."""
-    fields = [("time", f"{time:.1f} s")]
+    fields = [("time", f"{recording.began + time:.1f} s")]
     event = recording.event_at(time)
     return [*fields, ("now", event)] if event else fields
 

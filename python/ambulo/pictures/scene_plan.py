@@ -53,7 +53,8 @@ def write_scene_plan(
     events = _events(recording)
     props = Props(recording)
     low, high = _extent(recording, props)
-    legend = 2.4 if events else 0.2  # inches on the right
+    longest = max((len(text) for _, text in events), default=0)
+    legend = max(2.4, 0.5 + 0.066 * (longest + 10)) if events else 0.2  # inches on the right
     spare = np.array([0.6 + legend, 0.55 + (0.45 if title else 0.15)])
     scale = float(((np.array(size) / DPI - spare) / (high - low)).min())
     if scale <= 0.0:

@@ -170,6 +170,7 @@ pub struct Actor {
     moves: Arc<Moves>,
     stage: Stage,
     areas: Areas,
+    asked: Intent,
     told: Option<Told>,
     /// What was played in the frame before, and when in its clip.
     played: (Source, f32),
@@ -228,6 +229,7 @@ impl Actor {
             controller,
             stage: Stage::Free,
             areas,
+            asked: Intent::default(),
             told: None,
             played: (Source::Network, 0.0),
             jumped: false,
@@ -258,6 +260,7 @@ impl Actor {
         self.told = None;
         self.sense(around);
         let intent = self.decide(dt, wish, around);
+        self.asked = intent;
         let world = World { terrain: around.terrain(), areas: &self.areas };
         let before = level(self.controller.root().position);
         let step = self.controller.step(dt, &intent, &world);
@@ -288,6 +291,11 @@ impl Actor {
     /// Its controller: what the network does, which no layer changes.
     pub fn controller(&self) -> &Controller {
         &self.controller
+    }
+
+    /// What was asked of the controller in the last [`Actor::step`], and what it was to keep out of.
+    pub fn asked(&self) -> (&Intent, &Areas) {
+        (&self.asked, &self.areas)
     }
 
     /// Its body.

@@ -16,6 +16,7 @@ mod exact;
 mod ground;
 mod interaction;
 mod interaction_check;
+mod locate;
 mod object;
 mod parts;
 mod physics;
@@ -35,6 +36,7 @@ pub use interaction::{
     Action, Approach, Clip, Exit, Gait, Hand, INTERACTION_FORMAT, Interaction, Limb, Target,
     Trigger, Volume, Walks, When,
 };
+pub use locate::place;
 pub use object::{Button, Chair, Door, Kind, Lever, MovableBox, Object, ObjectKind, Side};
 pub use parts::{Frame, Motion, Part, Solid};
 pub use physics::{Hit, Moved, Physics, Push, Refused, STEP, Step, What};

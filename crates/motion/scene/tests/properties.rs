@@ -2,7 +2,7 @@
 
 use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Terrain, Transform};
-use ambulo_scene::{FileError, Interaction, Physics, Push, Scene, weight};
+use ambulo_scene::{FileError, Interaction, Physics, Push, Scene, Script, place, weight};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -13,24 +13,38 @@ const INTERACTIONS: [&str; 4] = [
     include_str!("../../../../starters/interactions/press_button.toml"),
 ];
 const SCENE: &str = include_str!("../../../../starters/scenes/playground.toml");
+const SCRIPT: &str = include_str!("../../../../starters/scenes/playground-visit.toml");
 
-fn one_line_each(error: &FileError) -> Result<(), TestCaseError> {
+fn document(which: usize) -> &'static str {
+    INTERACTIONS.into_iter().chain([SCENE, SCRIPT]).nth(which).unwrap()
+}
+
+fn one_line_each(text: &str, error: &FileError) -> Result<(), TestCaseError> {
     let problems = error.problems();
     let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
     prop_assert_eq!(error.to_string(), lines.join("\n"));
     prop_assert!(!problems.is_empty() && lines.iter().all(|line| !line.contains('\n')));
     prop_assert!(problems.iter().all(|one| one.path.starts_with('$') && !one.reason.is_empty()));
+    let lines = text.matches('\n').count() + 1;
+    let places = problems.iter().filter_map(|one| place(text, &one.path));
+    prop_assert!(
+        places.into_iter().all(|(line, column)| (1..=lines).contains(&line) && column > 0)
+    );
     Ok(())
 }
 
 fn assert_no_harm(text: &str) -> Result<(), TestCaseError> {
     match Interaction::parse(text) {
         Ok(one) => prop_assert_eq!(Interaction::parse(&one.to_text()).unwrap(), one),
-        Err(error) => one_line_each(&error)?,
+        Err(error) => one_line_each(text, &error)?,
     }
     match Scene::parse(text) {
         Ok(scene) => prop_assert_eq!(Scene::parse(&scene.to_text()).unwrap(), scene),
-        Err(error) => one_line_each(&error)?,
+        Err(error) => one_line_each(text, &error)?,
+    }
+    match Script::parse(text) {
+        Ok(script) => prop_assert_eq!(Script::parse(&script.to_text()).unwrap(), script),
+        Err(error) => one_line_each(text, &error)?,
     }
     Ok(())
 }
@@ -91,9 +105,9 @@ proptest! {
 
     #[test]
     fn changed_bytes_do_no_harm(
-        which in 0..5_usize, mutations in prop::collection::vec(mutation(), 1..4),
+        which in 0..6_usize, mutations in prop::collection::vec(mutation(), 1..4),
     ) {
-        let text = INTERACTIONS.get(which).unwrap_or(&SCENE);
+        let text = document(which);
         let mut bytes = text.as_bytes().to_vec();
         for (at, count, instead) in mutations {
             let start = at.index(bytes.len() + 1);
@@ -105,10 +119,10 @@ proptest! {
 
     #[test]
     fn changed_numbers_do_no_harm(
-        which in 0..5_usize,
+        which in 0..6_usize,
         changes in prop::collection::vec((any::<Index>(), number()), 1..4),
     ) {
-        let text = INTERACTIONS.get(which).unwrap_or(&SCENE);
+        let text = document(which);
         assert_no_harm(&renumbered(text, &changes))?;
     }
 
