@@ -49,6 +49,7 @@ MEASURES = (
     Measure("foot skate, mean", "cm/frame", 0.1,
             lambda m: m["skate_cm"]["mean"] if m["skate_cm"]["count"] else None),
     Measure("sits without standing up", "", 0.0, _sitting),
+    Measure("hands that slipped off", "", 0.0, lambda m: float(m["slips"])),
     Measure("tasks left undone", "", 0.0, lambda m: float(len(m["undone"]))),
 )  # fmt: skip
 

@@ -22,7 +22,9 @@ mod moves;
 
 use std::sync::Arc;
 
-use ambulo_control::{Areas, ControlError, Controller, Gait, Intent, Model, Root, Step, World};
+use ambulo_control::{
+    Areas, ControlError, Controller, Gait, Intent, Model, Root, Step, Tuning, World,
+};
 use ambulo_layers::{Decay, FeetState, Inertialiser, LookState};
 use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Pose, Transform};
@@ -201,7 +203,8 @@ pub struct Actor {
 }
 
 impl Actor {
-    /// A character that stands at a place (x, z) and faces a yaw.
+    /// A character that stands at a place (x, z) and faces a yaw. It moves by the bundle's own tuning;
+    /// one that has none is moved responsively ([`Tuning::responsive`]).
     ///
     /// # Errors
     /// A start that is not finite.
@@ -213,7 +216,9 @@ impl Actor {
         facing: f32,
         around: &dyn Surroundings,
     ) -> Result<Self, ControlError> {
-        let mut tuning = model.tuning();
+        // Whoever says nothing starts and turns at once: the last steps to a handle are short ones.
+        let own = model.tuning();
+        let mut tuning = if own == Tuning::default() { own.responsive() } else { own };
         // The feet's own layer holds them.
         tuning.hold_feet = false;
         let areas = Areas::default();

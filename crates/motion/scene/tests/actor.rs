@@ -10,9 +10,7 @@ use ambulo_formats::keys;
 
 use ambulo_net::Bundle;
 use ambulo_rig::glam::{Vec2, Vec3};
-use ambulo_scene::{
-    Act, Actor, Body, Interaction, Moves, Phase, Physics, STEP, Scene, Told, Wish,
-};
+use ambulo_scene::{Act, Actor, Body, Interaction, Moves, Phase, Physics, STEP, Scene, Told, Wish};
 use common::playground::{Playground, model, starters};
 
 /// A character in front of something of the playground.
@@ -88,7 +86,8 @@ fn the_network_knows_nothing_of_the_layers() {
         assert_eq!((own.root(), own.phase()), (bare.root(), bare.phase()), "frame {frame}");
         assert_eq!(own.trajectory(), bare.trajectory(), "frame {frame}");
         let mut other = pose.clone();
-        (own.pose(&mut pose), bare.pose(&mut other));
+        own.pose(&mut pose);
+        bare.pose(&mut other);
         assert_eq!(pose, other, "frame {frame}");
         let clip = visitor.actor.about().and_then(|about| about.clip);
         if matches!(clip, Some((Phase::Hold, _))) {

@@ -1,6 +1,6 @@
 //! The second half of a frame: from the network's pose to the one that is shown.
 
-use ambulo_layers::{Ground, Limb as Bones, Reach, Want};
+use ambulo_layers::{Ground, Limb as Bones, Pole, Reach, Want};
 use ambulo_rig::glam::{Quat, Vec3};
 use ambulo_rig::{Pose, Transform};
 
@@ -262,9 +262,28 @@ impl Actor {
                 }
                 let ankle = self.global[leg.joints()[2]].translation;
                 let toe = self.global[toe].translation;
-                self.take_out(leg, [toe, ankle], held, around);
-                self.take_out(leg, [toe.lerp(ankle, 0.5); 2], held, around);
+                // Arms may lie on what they carry, knees keep out of that, too.
+                self.take_out(leg, [toe, ankle], None, around);
+                self.take_out(leg, [toe.lerp(ankle, 0.5); 2], None, around);
+                self.swing_out(arm, held, around);
+                self.swing_out(leg, None, around);
             }
+        }
+    }
+
+    /// Swings a limb about the line from its first joint to its end until its elbow or knee, and what
+    /// is halfway to it, is out of what is solid, as far as that leads out.
+    fn swing_out(&mut self, limb: Bones, held: Option<usize>, around: &dyn Surroundings) {
+        let [first, middle, end] = limb.joints();
+        let at = self.global[middle].translation;
+        let half = at.lerp(self.global[first].translation, 0.5);
+        let half = around.way_out(half, held).map(|out| out * 2.0);
+        if let Some(out) = around.way_out(at, held).or(half) {
+            let asked = Reach {
+                pole: Some(Pole::Point(at + out)),
+                ..Reach::at(self.global[end].translation)
+            };
+            limb.reach(&self.body.skeleton, &asked, &mut self.shown, &mut self.global);
         }
     }
 
