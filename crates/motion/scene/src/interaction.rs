@@ -224,7 +224,7 @@ pub enum Action {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         until: Option<f32>,
     },
-    /// A box goes where the hands go; let go at `until`, or kept when the clip is over.
+    /// A box goes where the hands go; let go at `until`, or when the clip is over.
     Attach {
         /// One, or both: all of them are targets. It hangs on the first.
         hands: Vec<Hand>,

@@ -233,6 +233,9 @@ impl Actor {
             return if holds { Intent { velocity, ..standing } } else { standing };
         }
         let Some(left) = through(acting, interaction, root, around) else { return standing };
+        let turned = interaction.exit.facing.zip(around.frame(acting.object, &interaction.exit.on));
+        let facing = turned.map_or(yaw, |(facing, frame)| stand(frame, [0.0; 2], facing).1);
+        let standing = super::standing(ahead(facing));
         let way = left.normalize_or_zero();
         let handle = around.frame(acting.object, &interaction.approach.on);
         let gap = handle.map_or(f32::INFINITY, |handle| {

@@ -13,7 +13,7 @@ use crate::surroundings::Surroundings;
 /// A hand within this share of the farthest that it reaches slows the clip, which stops there.
 const STRETCH: f32 = 0.04;
 /// Arms longer than this share of their reach pull the hips.
-const COMFORT: f32 = 0.95;
+const COMFORT: f32 = 0.98;
 /// A hand that is farther than this from what it holds has slipped off, metres.
 const SLIP: f32 = 0.008;
 /// From this weight on a hand is expected at its target.
