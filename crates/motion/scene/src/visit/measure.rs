@@ -17,7 +17,7 @@ const STEADY: f32 = 0.5;
 /// A limb whose weight is above this is where it should be.
 const WHOLE: f32 = 0.999;
 /// Metres that a character walks, and how much of its height its hips regain, to have stood up.
-const STOOD: (f32, f32) = (0.5, 0.9);
+const STOOD: (f32, f32) = (0.25, 0.9);
 
 /// Greatest, mean and count of a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -77,7 +77,7 @@ pub struct Measured {
     pub farthest: String,
     /// Along the ground, of the ball of a foot while the feet's layer holds it, a frame.
     pub skate_cm: Numbers,
-    /// Sits, and those of them after which it stood up and walked half a metre.
+    /// Sits, and those of them after which it stood up and walked a quarter of a metre.
     pub sits: u32,
     /// As above.
     pub stood_up: u32,
