@@ -71,15 +71,24 @@ impl Terrain {
         x: PyReadonlyArray1<'py, f32>,
         z: PyReadonlyArray1<'py, f32>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        let (x, z) = (x.as_array(), z.as_array());
-        if x.len() != z.len() {
-            let message = format!("x has {} numbers, z {}", x.len(), z.len());
-            return Err(PyValueError::new_err(message));
-        }
-        let terrain = self.ground.as_terrain();
-        let heights = x.iter().zip(z).map(|(&x, &z)| terrain.height(x, z));
-        Ok(Array1::from_iter(heights).into_pyarray(py))
+        heights(py, self.ground.as_terrain(), x, z)
     }
+}
+
+/// Heights of a terrain at points (x, z) of two arrays of the same length.
+pub fn heights<'py>(
+    py: Python<'py>,
+    terrain: &dyn rig::Terrain,
+    x: PyReadonlyArray1<'py, f32>,
+    z: PyReadonlyArray1<'py, f32>,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let (x, z) = (x.as_array(), z.as_array());
+    if x.len() != z.len() {
+        let message = format!("x has {} numbers, z {}", x.len(), z.len());
+        return Err(PyValueError::new_err(message));
+    }
+    let heights = x.iter().zip(z).map(|(&x, &z)| terrain.height(x, z));
+    Ok(Array1::from_iter(heights).into_pyarray(py))
 }
 
 /// One character under control of a model.

@@ -7,16 +7,16 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use ambulo_control as control;
-use ambulo_rig::{Terrain, Transform};
+use ambulo_rig::Transform;
 use ambulo_scene as scene;
 use ambulo_scene::{Body, Happened, Interaction, Measured, Moves, Scene, Script, VisitError};
-use numpy::ndarray::{Array1, Array2};
+use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Serialize;
 
+use crate::character::heights;
 use crate::errors::{scene_error, value_error, visit_error};
 use crate::model::Model;
 use crate::motion::Clip;
@@ -271,14 +271,7 @@ impl Visit {
         x: PyReadonlyArray1<'py, f32>,
         z: PyReadonlyArray1<'py, f32>,
     ) -> PyResult<Bound<'py, PyArray1<f32>>> {
-        let (x, z) = (x.as_array(), z.as_array());
-        if x.len() != z.len() {
-            let message = format!("x has {} numbers, z {}", x.len(), z.len());
-            return Err(PyValueError::new_err(message));
-        }
-        let visit = self.now();
-        let ground = visit.physics().ground();
-        Ok(Array1::from_iter(x.iter().zip(z).map(|(&x, &z)| ground.height(x, z))).into_pyarray(py))
+        heights(py, self.now().physics().ground(), x, z)
     }
 
     /// What happened so far, as JSON: a list of `time`, `what`, `object`, `interaction`.

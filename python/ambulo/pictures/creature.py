@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ambulo.files import replacing
 from ambulo.pictures.creature_body import Array, Body, Joint, poses_at, read_body
 from ambulo.pictures.creature_paint import (
     LINE,
@@ -45,7 +44,7 @@ from ambulo.pictures.creature_view import (
     unit_of,
     write,
 )
-from ambulo.pictures.encode import open_film
+from ambulo.pictures.encode import write_pictures
 from ambulo.pictures.stage import ACCENT, INK, QUIET, Picture, smooth
 from ambulo.rollout import Rollout
 
@@ -221,16 +220,7 @@ def write_creature_film(
     def paint(k: int) -> Picture:
         return film_of.paint(float(rows[k]), views[k])
 
-    sample = np.linspace(0, count - 1, min(count, 12)).astype(int)
-    with (
-        replacing(path) as part,
-        open_film(part, path.suffix, size, fps, lambda: map(paint, sample.tolist())) as film,
-    ):
-        for k in range(count):
-            film.write(paint(k))
-            if progress is not None:
-                progress(k + 1, count)
-    return path
+    return write_pictures(path, count, paint, size=size, fps=fps, progress=progress)
 
 
 class _Film:

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ambulo.files import replacing
+
 Picture = NDArray[np.uint8]
 
 CLEAR = 255  # the palette index that means "as before"
@@ -51,6 +53,28 @@ def open_film(
             yield film
     else:
         raise ValueError(f"a film's name must end in .gif or .mp4, not {suffix!r}")
+
+
+def write_pictures(
+    path: Path,
+    count: int,
+    paint: Callable[[int], Picture],
+    *,
+    size: tuple[int, int],
+    fps: int,
+    progress: Callable[[int, int], object] | None,
+) -> Path:
+    """Writes the film of `count` pictures that `paint` paints by index, whole or not at all."""
+    sample = np.linspace(0, count - 1, min(count, 12)).astype(int).tolist()
+    with (
+        replacing(path) as part,
+        open_film(part, path.suffix, size, fps, lambda: map(paint, sample)) as film,
+    ):
+        for k in range(count):
+            film.write(paint(k))
+            if progress is not None:
+                progress(k + 1, count)
+    return path
 
 
 # GIF ----------------------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 
 from ambulo.files import replacing
 from ambulo.pictures.drawing import Array, Camera, Pixels
-from ambulo.pictures.encode import open_film
+from ambulo.pictures.encode import write_pictures
 from ambulo.pictures.stage import (
     ACCENT,
     INK,
@@ -78,20 +78,12 @@ def write_film(
     stage = Stage(recording, terrain, _points(waypoints))
     takes = _plan(recording, shots, stage, size, fps, view)
 
-    def paint(take: _Take) -> Picture:
+    def paint(k: int) -> Picture:
+        take = takes[k]
         fields = _fields(stage, take)
         return caption(to_bytes(stage.paint(take.frame, take.camera, take.sun)), take.title, fields)
 
-    sample = [takes[i] for i in np.linspace(0, len(takes) - 1, min(len(takes), 12)).astype(int)]
-    with (
-        replacing(path) as part,
-        open_film(part, path.suffix, size, fps, lambda: map(paint, sample)) as film,
-    ):
-        for done, take in enumerate(takes, 1):
-            film.write(paint(take))
-            if progress is not None:
-                progress(done, len(takes))
-    return path
+    return write_pictures(path, len(takes), paint, size=size, fps=fps, progress=progress)
 
 
 def _plan(

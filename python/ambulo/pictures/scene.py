@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 
 from ambulo.files import replacing
 from ambulo.pictures.drawing import Camera
-from ambulo.pictures.encode import open_film
+from ambulo.pictures.encode import write_pictures
 from ambulo.pictures.film import check_size
 from ambulo.pictures.mannequin import Mannequin
 from ambulo.pictures.scene_camera import Watch
@@ -70,16 +70,7 @@ def write_scene_film(
         fields = _fields(recording, time)
         return caption(_veiled(picture, title, fields), title, fields)
 
-    sample = np.linspace(0, count - 1, min(count, 12)).astype(int)
-    with (
-        replacing(path) as part,
-        open_film(part, path.suffix, size, fps, lambda: map(paint, sample.tolist())) as film,
-    ):
-        for k in range(count):
-            film.write(paint(k))
-            if progress is not None:
-                progress(k + 1, count)
-    return path
+    return write_pictures(path, count, paint, size=size, fps=fps, progress=progress)
 
 
 def draw_scene(

@@ -14,6 +14,7 @@ from ambulo.pictures.scene_set import Props
 from ambulo.pictures.solids import Boxes
 from ambulo.pictures.stage import between
 from ambulo.pictures.sunlight import hull
+from ambulo.pictures.top_view import dress_plan
 from ambulo.scene_recording import GroundPatch, SceneRecording
 
 if TYPE_CHECKING:
@@ -197,20 +198,6 @@ def _draw_events(
 
 def _finish(axes: Axes, low: Array, high: Array, title: str) -> None:
     """Axes and title."""
-    from matplotlib.ticker import MultipleLocator
-
-    axes.set_aspect("equal")
-    step = next((s for s in (1.0, 2.0, 5.0, 10.0, 20.0) if max(high - low) < 16.0 * s), 50.0)
-    axes.xaxis.set_major_locator(MultipleLocator(step))
-    axes.yaxis.set_major_locator(MultipleLocator(step))
-    axes.set_xlim(high[0], low[0])  # +X to the left: seen from above
-    axes.set_ylim(low[1], high[1])
-    axes.set_xlabel("x, metres (+X to the left: seen from above)", color=INK)
-    axes.set_ylabel("z, metres", color=INK)
-    axes.grid(color="#e3e4e6", lw=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=QUIET, length=0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    dress_plan(axes, low, high, grid="#e3e4e6", line=0.6)
     if title:
         axes.set_title(title, loc="left", color=INK, fontsize=14, pad=10)

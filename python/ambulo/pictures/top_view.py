@@ -154,6 +154,25 @@ def _draw_facing(axes: Axes, recording: Recording, size: float) -> int:
     return period
 
 
+def dress_plan(axes: Axes, low: Array, high: Array, *, grid: str, line: float) -> None:
+    """Axes of a plan from `low` to `high` (x, z, metres), +X to the left, and its grid's lines."""
+    from matplotlib.ticker import MultipleLocator
+
+    axes.set_aspect("equal")
+    step = next((s for s in (1.0, 2.0, 5.0, 10.0, 20.0) if max(high - low) < 16.0 * s), 50.0)
+    axes.xaxis.set_major_locator(MultipleLocator(step))
+    axes.yaxis.set_major_locator(MultipleLocator(step))
+    axes.set_xlim(high[0], low[0])  # +X to the left: seen from above
+    axes.set_ylim(low[1], high[1])
+    axes.set_xlabel("x, metres (+X to the left: seen from above)", color=INK)
+    axes.set_ylabel("z, metres", color=INK)
+    axes.grid(color=grid, lw=line)
+    axes.set_axisbelow(True)
+    axes.tick_params(colors=QUIET, length=0)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
 def _finish(
     figure: Figure,
     axes: Axes,
@@ -165,21 +184,8 @@ def _finish(
 ) -> None:
     """Axes, legend and title."""
     from matplotlib.lines import Line2D
-    from matplotlib.ticker import MultipleLocator
 
-    axes.set_aspect("equal")
-    step = next((s for s in (1.0, 2.0, 5.0, 10.0, 20.0) if max(high - low) < 16.0 * s), 50.0)
-    axes.xaxis.set_major_locator(MultipleLocator(step))
-    axes.yaxis.set_major_locator(MultipleLocator(step))
-    axes.set_xlim(high[0], low[0])  # +X to the left: seen from above
-    axes.set_ylim(low[1], high[1])
-    axes.set_xlabel("x, metres (+X to the left: seen from above)", color=INK)
-    axes.set_ylabel("z, metres", color=INK)
-    axes.grid(color="#eceded", lw=0.8)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=QUIET, length=0)
-    for spine in axes.spines.values():
-        spine.set_visible(False)
+    dress_plan(axes, low, high, grid="#eceded", line=0.8)
     present = [int(g) for g in np.unique(recording.gait)]
     handles = [
         Line2D([], [], color=GAITS[g % len(GAITS)], lw=2.6, label=recording.gait_names[g])

@@ -26,10 +26,11 @@ use ambulo_control::{
     Areas, ControlError, Controller, Gait, Intent, Model, Root, Step, Tuning, World,
 };
 use ambulo_layers::{Decay, FeetState, Inertialiser, LookState};
-use ambulo_rig::glam::{Vec2, Vec3};
+use ambulo_rig::glam::Vec2;
 use ambulo_rig::{Pose, Transform};
 
 use crate::approach::{Going, Walk, Why};
+use crate::exact::{ahead, level};
 use crate::interaction::{Action, Limb, Walks};
 use crate::surroundings::Surroundings;
 
@@ -174,8 +175,8 @@ pub struct Actor {
     areas: Areas,
     asked: Intent,
     told: Option<Told>,
-    /// What was played in the frame before, and when in its clip.
-    played: (Source, f32),
+    /// What was played in the frame before.
+    played: Source,
     /// A jump within the same clip.
     jumped: bool,
     /// What the hands hold.
@@ -236,7 +237,7 @@ impl Actor {
             areas,
             asked: Intent::default(),
             told: None,
-            played: (Source::Network, 0.0),
+            played: Source::Network,
             jumped: false,
             holds: None,
             pace: 1.0,
@@ -359,8 +360,7 @@ impl Actor {
 
     /// What is in the way becomes walls of the controller.
     fn sense(&mut self, around: &dyn Surroundings) {
-        let place = self.controller.root().position;
-        let place = Vec2::new(place.x, place.z);
+        let place = level(self.controller.root().position);
         if let (Stage::Free, Some((object, room))) = (self.stage, self.near) {
             // Nobody is pushed off what was used: the distance to keep grows as it walks away.
             let room = room.max(around.distance(object, place) - LEAST);
@@ -458,14 +458,4 @@ impl Actor {
 /// To stand and look somewhere.
 fn standing(facing: Vec2) -> Intent {
     Intent { velocity: Vec2::ZERO, facing: Some(facing), strafe: 1.0, gait: Gait::Walk }
-}
-
-/// (x, z) of a place.
-fn level(place: Vec3) -> Vec2 {
-    Vec2::new(place.x, place.z)
-}
-
-/// Where a yaw looks, (x, z).
-pub(crate) fn ahead(yaw: f32) -> Vec2 {
-    Vec2::new(libm::sinf(yaw), libm::cosf(yaw))
 }

@@ -8,6 +8,7 @@ use ambulo_control::{Gait as Pace, Intent, Root};
 use ambulo_rig::glam::Vec2;
 use ambulo_rig::wrapped;
 
+use crate::exact::{ahead, level};
 use crate::{Approach, Gait};
 
 /// Metres a second for each metre that is left: slow enough that who arrives does not overshoot.
@@ -102,7 +103,7 @@ impl Walk {
     /// What to do in the next `dt` seconds, the character being at `root` and the player wishing for
     /// that velocity (x, z).
     pub fn step(&mut self, root: Root, wish: Vec2, dt: f32) -> Going {
-        let to = self.place - Vec2::new(root.position.x, root.position.z);
+        let to = self.place - level(root.position);
         let left = [to.length(), wrapped(self.yaw - root.yaw).abs()];
         if !(left[0].is_finite() && left[1].is_finite()) {
             return Going::GaveUp(Why::Lost);
@@ -129,7 +130,7 @@ impl Walk {
         if self.stuck >= PATIENCE {
             return Going::GaveUp(Why::Blocked);
         }
-        let ahead = Vec2::new(libm::sinf(self.yaw), libm::cosf(self.yaw));
+        let ahead = ahead(self.yaw);
         if self.back > 0.0 {
             // From there it comes straight on, facing as it should.
             self.back -= dt;

@@ -9,7 +9,7 @@ pub fn weight(keys: &[[f32; 2]], time: f32) -> f32 {
     match (next.checked_sub(1).map(|i| keys[i]), keys.get(next)) {
         (Some([start, from]), Some(&[end, to])) => {
             let t = ((time - start) / (end - start)).clamp(0.0, 1.0);
-            let value = from + (to - from) * (t * t * (3.0 - 2.0 * t));
+            let value = from + (to - from) * ease(t);
             // Rounding must not leave the range; NaN, which no file has, passes.
             value.min(from.max(to)).max(from.min(to))
         }
@@ -17,6 +17,11 @@ pub fn weight(keys: &[[f32; 2]], time: f32) -> f32 {
         (None, Some(&[_, first])) => first,
         (None, None) => 0.0,
     }
+}
+
+/// From 0 to 1 as `t` goes from 0 to 1, flat at both.
+pub(crate) fn ease(t: f32) -> f32 {
+    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

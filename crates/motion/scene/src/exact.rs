@@ -1,10 +1,10 @@
-//! Rotations whose bits are the same on every processor: what goes into the physics.
+//! Rotations and directions whose bits are the same on every processor: what goes into the physics.
 //!
 //! glam multiplies quaternions with whatever vector instructions there are, and those add up in
 //! different orders. Written out, every operation is one that IEEE 754 prescribes.
 
 use ambulo_rig::Transform;
-use ambulo_rig::glam::{Quat, Vec3};
+use ambulo_rig::glam::{Quat, Vec2, Vec3};
 
 /// First `b`, then `a`.
 pub(crate) fn product(a: Quat, b: Quat) -> Quat {
@@ -54,6 +54,16 @@ pub(crate) fn between(a: Transform, b: Transform, t: f32) -> Transform {
 pub(crate) fn turn(from: Quat, to: Quat) -> Vec3 {
     let turned = product(to, conjugate(from));
     vector(turned) * (2.0 * turned.w.signum())
+}
+
+/// (x, z) of a place.
+pub(crate) fn level(place: Vec3) -> Vec2 {
+    Vec2::new(place.x, place.z)
+}
+
+/// Where a yaw looks, (x, z).
+pub(crate) fn ahead(yaw: f32) -> Vec2 {
+    Vec2::new(libm::sinf(yaw), libm::cosf(yaw))
 }
 
 /// The imaginary part.

@@ -3,6 +3,7 @@
 use ambulo_rig::glam::Vec2;
 use ambulo_rig::{HeightField, Terrain};
 
+use crate::curve::ease;
 use crate::scene_file::{Ground, GroundKind};
 
 /// Metres between the heights of a rugged piece.
@@ -123,7 +124,7 @@ fn hills(size: [f32; 2], rise: f32, wave: f32, seed: u32) -> HeightField {
 /// a tenth of the size inward, smooth between.
 fn fade(at: f32, size: f32) -> f32 {
     let t = ((0.5 * size - CELL - at.abs()) / (0.1 * size)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    ease(t)
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::pipeline::{PhysicsWorld, QueryFilter};
 use rapier3d::prelude::{ImpulseJointHandle, Ray, RigidBodyHandle};
 
-use crate::exact::{between, compose, inverse, vector};
+use crate::exact::{between, compose, inverse, level, vector};
 use crate::ground::GroundPieces;
 use crate::object::{Kind, ObjectKind};
 use crate::parts::{Motion, Part};
@@ -317,9 +317,4 @@ fn to_pose(at: Transform) -> Pose {
 fn from_pose(pose: &Pose) -> Transform {
     let rotation = Quat::from_array(pose.rotation.to_array());
     Transform::new(from_vector(pose.translation), rotation)
-}
-
-/// Along the ground.
-fn level(v: Vec3) -> Vec2 {
-    Vec2::new(v.x, v.z)
 }

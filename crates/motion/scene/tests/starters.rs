@@ -1,31 +1,16 @@
 //! The scene and the interactions that ship can be read, fit each other, and make sense.
 
+mod common;
+
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
 
 use ambulo_rig::Terrain;
 use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_scene::{Action, Interaction, Limb, Physics, Scene, When};
-
-fn starters() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../starters")
-}
-
-fn playground() -> Scene {
-    let text = std::fs::read_to_string(starters().join("scenes/playground.toml")).unwrap();
-    Scene::parse(&text).unwrap_or_else(|error| panic!("playground.toml:\n{error}"))
-}
+use common::playground::playground;
 
 fn interactions() -> HashMap<String, Interaction> {
-    let files = std::fs::read_dir(starters().join("interactions")).unwrap();
-    let read = files.map(|file| {
-        let file = file.unwrap();
-        let name = file.file_name().into_string().unwrap();
-        let text = std::fs::read_to_string(file.path()).unwrap();
-        let one = Interaction::parse(&text).unwrap_or_else(|error| panic!("{name}:\n{error}"));
-        (name, one)
-    });
-    read.collect()
+    common::playground::interactions().into_iter().collect()
 }
 
 #[test]

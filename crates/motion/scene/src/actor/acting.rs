@@ -2,10 +2,12 @@
 //! meanwhile.
 
 use ambulo_control::{Intent, Root};
-use ambulo_rig::glam::Vec2;
+use ambulo_rig::glam::{Vec2, Vec3};
 use ambulo_rig::{Transform, wrapped};
 
-use super::{Act, Actor, Stage, Told, Wish, ahead, level, standing};
+use super::{Act, Actor, Stage, Told, Wish, standing};
+use crate::curve::ease;
+use crate::exact::{ahead, level};
 use crate::interaction::{Action, Interaction, Walks, When, stand};
 use crate::object::yawed;
 use crate::surroundings::Surroundings;
@@ -68,15 +70,14 @@ impl Acting {
             Phase::Exit => (self.stand, (level(root.position), root.yaw), [clip.exit, clip.end]),
             _ => (self.from, self.stand, [clip.enter, clip.hold]),
         };
-        let t = ((time - span[0]) / (span[1] - span[0])).clamp(0.0, 1.0);
-        let t = t * t * (3.0 - 2.0 * t);
+        let t = ease(((time - span[0]) / (span[1] - span[0])).clamp(0.0, 1.0));
         (from.0.lerp(to.0, t), from.1 + wrapped(to.1 - from.1) * t)
     }
 }
 
 /// A place on the ground at a height.
 pub(super) fn placed((place, yaw): (Vec2, f32), height: f32) -> Transform {
-    Transform::new(ambulo_rig::glam::Vec3::new(place.x, height, place.y), yawed(yaw))
+    Transform::new(Vec3::new(place.x, height, place.y), yawed(yaw))
 }
 
 impl Actor {

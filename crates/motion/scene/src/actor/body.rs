@@ -59,20 +59,13 @@ impl Body {
         let stance = model.stance().ok_or(BodyError::Stands)?;
         let part =
             |what, reason: &dyn ToString| BodyError::Part { what, reason: reason.to_string() };
-        let arm = |hand: usize| {
-            Bones::new(&skeleton, hand, &rest, LimbSettings { softness: 0.01, ..LimbSettings::ARM })
-                .map_err(|error| part("arms", &error))
+        let limb = |what, end: usize, bent: &[Transform], settings: LimbSettings| {
+            Bones::new(&skeleton, end, bent, LimbSettings { softness: 0.01, ..settings })
+                .map_err(|error| part(what, &error))
         };
+        let arm = |side: usize| limb("arms", hands[side], &rest, LimbSettings::ARM);
         let ankles = roles.feet.ok_or(BodyError::Role("feet"))?;
-        let leg = |ankle: usize| {
-            Bones::new(
-                &skeleton,
-                ankle,
-                &stance,
-                LimbSettings { softness: 0.01, ..LimbSettings::LEG },
-            )
-            .map_err(|error| part("legs", &error))
-        };
+        let leg = |side: usize| limb("legs", ankles[side], &stance, LimbSettings::LEG);
         let place = |settings| {
             FootPlacement::new(&skeleton, &roles, &stance, 0.0, settings)
                 .map_err(|error| part("feet", &error))
@@ -86,8 +79,8 @@ impl Body {
         let palm = |side| ambulo_rig::palm(&skeleton, &roles, side).ok_or(BodyError::Role("arms"));
         let thighs = roles.thighs.ok_or(BodyError::Role("thighs"))?;
         Ok(Self {
-            arms: [arm(hands[0])?, arm(hands[1])?],
-            legs: [leg(ankles[0])?, leg(ankles[1])?],
+            arms: [arm(0)?, arm(1)?],
+            legs: [leg(0)?, leg(1)?],
             palms: [palm(0)?, palm(1)?],
             feet: walking_feet,
             standing_feet,

@@ -59,12 +59,12 @@ impl Actor {
         let none = || Pose { local: vec![] };
         let [mut now, mut before] = std::mem::replace(&mut self.source, [none(), none()]);
         self.write_source(source, time, 0, around, &mut now);
-        if (source != self.played.0 || self.jumped) && dt > 0.0 {
+        if (source != self.played || self.jumped) && dt > 0.0 {
             self.write_source(source, time - self.tick, 1, around, &mut before);
             // Refused only for numbers that are not finite, which no pose here has.
             let _ = self.inertialiser.switch(&before, &now, dt);
         }
-        (self.played, self.jumped) = ((source, time), false);
+        (self.played, self.jumped) = (source, false);
         let _ = self.inertialiser.step(&now, dt, &mut self.shown);
         self.source = [now, before];
     }
@@ -167,7 +167,7 @@ impl Actor {
 
     fn place_feet(&mut self, acting: Option<Acting>, dt: f32, around: &dyn Surroundings) {
         let root = self.controller.root();
-        let clip = match (self.played.0, acting) {
+        let clip = match (self.played, acting) {
             (Source::Clip(which), Some(acting)) => Some((which, acting)),
             _ => None,
         };

@@ -4,8 +4,9 @@ use ambulo_rig::glam::{Mat3, Quat, Vec2, Vec3};
 use ambulo_rig::{Transform, share};
 
 use super::acting::{Acting, Phase};
-use super::{Actor, Stage, ahead};
+use super::{Actor, Stage};
 use crate::Push;
+use crate::exact::ahead;
 use crate::interaction::{Action, Hand, Interaction, Limb};
 use crate::surroundings::{Deed, Surroundings};
 

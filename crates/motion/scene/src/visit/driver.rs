@@ -5,7 +5,8 @@ use ambulo_rig::Terrain;
 use ambulo_rig::glam::{Vec2, Vec3};
 
 use super::script::{Interruptions, Script, Task};
-use crate::actor::{Act, Actor, Moves, Phase, Told, Wish, ahead};
+use crate::actor::{Act, Actor, Moves, Phase, Told, Wish};
+use crate::exact::{ahead, level};
 use crate::interaction::{Action, Walks, When, stand};
 use crate::object::Kind;
 use crate::surroundings::Surroundings;
@@ -390,7 +391,7 @@ impl Driver {
         (self.begun, self.held, self.planned) = (None, None, None);
         let angle = self.chance.between(0.0, std::f32::consts::TAU);
         if self.disturbed {
-            let way = Vec2::new(libm::sinf(angle), libm::cosf(angle)) * WALK;
+            let way = ahead(angle) * WALK;
             self.strolls = (AFTER, way);
         }
     }
@@ -414,8 +415,7 @@ fn passes(actor: &Actor, which: usize) -> bool {
 
 /// (x, z) of where a character is.
 fn place(actor: &Actor) -> Vec2 {
-    let root = actor.root().position;
-    Vec2::new(root.x, root.z)
+    level(actor.root().position)
 }
 
 /// Metres that are free in front of somebody at a place, at most `far`, whatever it carries.

@@ -22,6 +22,11 @@ pub fn starters() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../starters")
 }
 
+pub fn playground() -> Scene {
+    let text = std::fs::read_to_string(starters().join("scenes/playground.toml")).unwrap();
+    Scene::parse(&text).unwrap_or_else(|error| panic!("playground.toml:\n{error}"))
+}
+
 pub fn model() -> Model {
     let bytes = std::fs::read(starters().join("human.safetensors")).unwrap();
     Model::new(Arc::new(Bundle::from_bytes(&bytes).unwrap())).unwrap()
@@ -41,8 +46,7 @@ pub fn interactions() -> Vec<(String, Interaction)> {
 
 impl Playground {
     pub fn read(model: &Model) -> Self {
-        let text = std::fs::read_to_string(starters().join("scenes/playground.toml")).unwrap();
-        let scene = Scene::parse(&text).unwrap_or_else(|error| panic!("playground.toml:\n{error}"));
+        let scene = playground();
         let body = Arc::new(Body::new(model).unwrap());
         let all = interactions();
         let mut clips: HashMap<String, Clip> = HashMap::new();
